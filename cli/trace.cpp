@@ -302,30 +302,6 @@ Json trace_json(const TraceCommand& options, const std::string& mode, const Tall
     return json;
 }
 
-/// Kernels of a GPU count no visits; simulated ones have simulated rates.
-void print_warps(const Json& trace) {
-    const auto count = trace["count"].get<std::uint64_t>();
-    const auto hits = trace["hits"].get<std::uint64_t>();
-    fmt::print("\n{} rays, {} hits by {} on device {}\n", grouped(count), grouped(hits),
-               trace["kernel"].get<std::string>(),
-               trace.value("device_name", trace["device"].get<std::string>()));
-    if (trace.contains("simulated")) {
-        const Json& s = trace["simulated"];
-        fmt::print(
-            "the hits come from the simulator; *simulated* on {}: at most {:.1f} Mrays/s, {:.1f} "
-            "with the distribution of work\n",
-            s["machine"].get<std::string>(), s["mrays_per_s_bound"].get<double>(),
-            s["mrays_per_s_scheduled"].get<double>());
-    } else if (count != 0) {
-        const Json &kernel = trace["mrays_per_s"], &all = trace["mrays_per_s_end_to_end"];
-        fmt::print("{:.1f} Mrays/s in the kernel ({:.1f} to {:.1f}), {:.1f} from rays to hits\n",
-                   kernel["median"].get<double>(), kernel["min"].get<double>(),
-                   kernel["max"].get<double>(), all["median"].get<double>());
-    }
-    if (const auto invalid = trace["invalid_rays"].get<std::uint64_t>())
-        fmt::print("{} rays are invalid and count as misses\n", grouped(invalid));
-}
-
 void print_trace(const Json& trace) {
     fmt::print("\n{:<18} {:>12} {:>12} {:>9} {:>9} {:>9} {:>11} {:>14}\n", "rays", "count", "hits",
                "Mrays/s", "min", "max", "nodes/ray", "triangles/ray");
@@ -521,7 +497,7 @@ void run_trace(const TraceCommand& given) {
         if (options.common.prints_tables()) fmt::print("ao radius {:g}\n", radius);
     }
     if (options.common.prints_tables())
-        warps ? print_warps(document["trace"][0]) : print_trace(document["trace"][0]);
+        warps ? print_warp_trace(document["trace"][0]) : print_trace(document["trace"][0]);
     write_json(document, options.common);
 }
 

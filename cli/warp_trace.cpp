@@ -1,6 +1,7 @@
 // Rays of the caller -> device or simulator -> hits of the caller.
 #include "warp_trace.h"
 
+#include <fmt/format.h>
 #include <raydix/trace.h>
 
 #include <CLI/CLI.hpp>
@@ -116,6 +117,29 @@ Json WarpTracer::simulated_json() const {
             {"mrays_per_s_bound", rates.bound},
             {"mrays_per_s_scheduled", rates.scheduled},
             {"simd_efficiency", rates.simd_efficiency}};
+}
+
+void print_warp_trace(const Json& trace) {
+    const auto count = trace["count"].get<std::uint64_t>();
+    const auto hits = trace["hits"].get<std::uint64_t>();
+    fmt::print("\n{} rays, {} hits by {} on device {}\n", grouped(count), grouped(hits),
+               trace["kernel"].get<std::string>(),
+               trace.value("device_name", trace["device"].get<std::string>()));
+    if (trace.contains("simulated")) {
+        const Json& s = trace["simulated"];
+        fmt::print(
+            "the hits come from the simulator; *simulated* on {}: at most {:.1f} Mrays/s, {:.1f} "
+            "with the distribution of work\n",
+            s["machine"].get<std::string>(), s["mrays_per_s_bound"].get<double>(),
+            s["mrays_per_s_scheduled"].get<double>());
+    } else if (count != 0) {
+        const Json &kernel = trace["mrays_per_s"], &all = trace["mrays_per_s_end_to_end"];
+        fmt::print("{:.1f} Mrays/s in the kernel ({:.1f} to {:.1f}), {:.1f} from rays to hits\n",
+                   kernel["median"].get<double>(), kernel["min"].get<double>(),
+                   kernel["max"].get<double>(), all["median"].get<double>());
+    }
+    if (const auto invalid = trace["invalid_rays"].get<std::uint64_t>())
+        fmt::print("{} rays are invalid and count as misses\n", grouped(invalid));
 }
 
 }  // namespace raydix::cli

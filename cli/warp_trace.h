@@ -62,4 +62,8 @@ private:
     std::uint64_t invalid_ = 0;
 };
 
+/// Prints one of the document's traces: kernels of a GPU count no visits, simulated ones have
+/// simulated rates.
+void print_warp_trace(const Json& trace);
+
 }  // namespace raydix::cli

@@ -75,10 +75,10 @@ struct Model {
 /// `seed` drives built-in scenes. Files: .ply (ascii, binary little and big endian), .obj, .stl
 /// (ascii, binary), .gltf, .glb, .off, .xyz or .npy, each also with .gz, .xz or .zst behind it.
 /// Polygons are fanned in order. Coordinates are rounded to float: a SceneD of the model has those.
-/// -0 becomes +0. Coordinates that are not finite are kept; builders
-/// leave such triangles out. Memory stays in proportion to what the file really holds. Throws
-/// InputError for what cannot be read or does not exist: "FILE: ELEMENT: reason"; not for a
-/// cameras.json beside the file, which may be another program's (Model::cameras_fault).
+/// -0 becomes +0. Coordinates that are not finite are kept; builders leave such triangles out.
+/// Memory stays in proportion to what the file really holds. Throws InputError for what cannot be
+/// read or does not exist: "FILE: ELEMENT: reason"; not for a cameras.json beside the file, which
+/// may be another program's (Model::cameras_fault).
 [[nodiscard]] Model load_model(const std::string& spec, std::uint64_t seed = 1);
 
 /// As load_model, then Model::flatten.
