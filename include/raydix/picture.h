@@ -26,7 +26,7 @@ struct Picture {
 /// - `shaded`: grey surfaces under sky and sun with shadows; in closed rooms under a lamp at the
 ///   camera.
 /// - `normal`: (n + 1) / 2 of the geometric normal, turned to the viewer.
-/// - `depth`: distance along the view, from white at the nearest hit to black at the farthest.
+/// - `depth`: distance along the view, from 1 at the nearest hit down to 1/10 at the farthest.
 /// - `primitive`: a colour for each triangle, and of a scene for each instance that shows it.
 /// - `ao`: the part of the sky that is open within ao_radius.
 /// - `diffuse`: as `shaded`, with one bounce of light in place of the even sky.

@@ -146,7 +146,7 @@ std::vector<Vec3> tile_samples(const RenderScene& scene, std::span<const std::ui
     }
 }
 
-/// Distances -> 1 at the nearest hit of the picture down to 0 at the farthest; nothing hit is 0.
+/// Distances -> 1 at the nearest hit of the picture down to 1/10 at the farthest; nothing hit is 0.
 void scale_depth(Picture& picture) {
     float nearest = infinity, farthest = 0.0f;
     for (const Vec3& p : picture.pixels) {
@@ -156,7 +156,7 @@ void scale_depth(Picture& picture) {
     }
     const float range = farthest > nearest ? farthest - nearest : 1.0f;
     for (Vec3& p : picture.pixels)
-        p = p.x == infinity ? grey(0.0f) : grey(1.0f - (p.x - nearest) / range);
+        p = p.x == infinity ? grey(0.0f) : grey(1.0f - 0.9f * (p.x - nearest) / range);
 }
 
 /// Counts -> heat map. Its top is the count that 1 pixel in 200 exceeds, so that a few extremes do

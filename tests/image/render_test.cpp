@@ -47,7 +47,7 @@ TEST(RenderNormal, PointsTowardTheViewerLeftIsLeftUpIsUp) {
     EXPECT_EQ(at(picture, 0, 0).x, 0.0f);
 }
 
-TEST(RenderDepth, NearWhiteFarBlack) {
+TEST(RenderDepth, NearWhiteFarDarkNothingBlack) {
     Mesh mesh;
     test::add_quad(mesh, {-1, -1, 0}, {0, -1, 0}, {0, 1, 0}, {-1, 1, 0});
     test::add_quad(mesh, {0, -1, -2}, {1, -1, -2}, {1, 1, -2}, {0, 1, -2});
@@ -56,9 +56,9 @@ TEST(RenderDepth, NearWhiteFarBlack) {
                                    options_for(View::depth, 65, 65));
     // Distances along the view: 2 (near), 3 and 5 (far).
     EXPECT_NEAR(at(picture, 32, 32).x, 1.0f, 1e-6f);
-    EXPECT_NEAR(at(picture, 22, 32).x, 2.0f / 3.0f, 1e-6f);
-    EXPECT_NEAR(at(picture, 14, 24).x, 2.0f / 3.0f, 1e-6f);
-    EXPECT_NEAR(at(picture, 40, 32).x, 0.0f, 1e-6f);
+    EXPECT_NEAR(at(picture, 22, 32).x, 0.7f, 1e-6f);
+    EXPECT_NEAR(at(picture, 14, 24).x, 0.7f, 1e-6f);
+    EXPECT_NEAR(at(picture, 40, 32).x, 0.1f, 1e-6f);
     EXPECT_EQ(at(picture, 1, 1).x, 0.0f);
 }
 
