@@ -344,6 +344,7 @@ Json machine_model_json(const MachineModel& m) {
                          {"origin", cost.origin}});
         if (!cost.kernel.empty()) costs.back()["kernel"] = cost.kernel;
         if (cost.most > 0) costs.back()["most"] = cost.most;
+        if (cost.half_rate > 0) costs.back()["half_rate"] = cost.half_rate;
     }
     return {{"name", m.name},
             {"origin", m.origin},
@@ -355,6 +356,9 @@ Json machine_model_json(const MachineModel& m) {
             {"stack_read_clocks", m.stack_read_clocks},
             {"resident_lanes", m.resident_lanes},
             {"block_lanes", m.block_lanes},
+            {"registers", m.registers},
+            {"shared_bytes", m.shared_bytes},
+            {"l1_shared_bytes", m.l1_shared_bytes},
             {"block_release", block_release_name(m.block_release)},
             {"l1_transactions_per_clock", m.l1_transactions_per_clock},
             {"l1_bytes", m.l1_bytes},

@@ -82,9 +82,10 @@ void trace_reference(const WarpTree& tree, std::span<const Ray> rays, std::span<
 struct OperationCost {
     std::string operation;
     std::uint32_t instructions = 0;
-    std::string origin;       // where the number comes from
-    std::string kernel = {};  // empty: all kernels that have no cost of their own
-    std::uint32_t most = 0;   // upper end of its range if it was derived; 0: not known
+    std::string origin;           // where the number comes from
+    std::string kernel = {};      // empty: all kernels that have no cost of their own
+    std::uint32_t most = 0;       // upper end of its range if it was derived; 0: not known
+    std::uint32_t half_rate = 0;  // of the instructions, those that half of the lanes execute
 };
 
 /// When a block's place on a multiprocessor is free for another block.
@@ -108,13 +109,17 @@ struct MachineModel {
     double stack_read_clocks = 0;         // and for the stack of a thread, in local memory
     std::uint32_t resident_lanes = 1024;  // in flight
     std::uint32_t block_lanes = 128;      // of one block
+    // What may keep a kernel below resident_lanes: 32-bit registers, bytes that blocks share. 0: no
+    // limit. A kernel takes what it has on sm_90.
+    std::uint32_t registers = 0, shared_bytes = 0;
     BlockRelease block_release = BlockRelease::own;
-    // The memory model (docs/simulator.md). A transaction is a request for one 128-byte line, by a
-    // quarter of a warp for words of 16 bytes.
+    // The memory model (docs/simulator.md). A transaction is a request by a quarter of a warp for
+    // words of 16 bytes, and for 128 bytes of lines.
     double l1_transactions_per_clock = 1;
     double l2_gb_per_s = 100, dram_gb_per_s = 100;
     std::uint32_t l1_bytes = 16384;     // of each multiprocessor; 0: no cache holds data
     std::uint32_t l1_line_bytes = 128;  // a multiple of 32, at most 4,096
+    std::uint32_t l1_shared_bytes = 0;  // L1 and what blocks share, together; 0: they are apart
     bool replays = false;  // further lines of one request are asked for by issuing it again
     std::uint32_t l2_bytes = 1u << 20;
     std::uint32_t texture_bytes = 0;       // of a texture cache, in lines of 32; 0: there is none
@@ -188,7 +193,7 @@ struct SimulatedRates {
     double memory = 0;
     std::string_view memory_limit = {};
     struct Limit {
-        std::string_view name;  // "replays", "texture", "l1", "l2", "dram", "latency"
+        std::string_view name;  // "half_rate", "replays", "texture", "l1", "l2", "dram", "latency"
         double mrays_per_s;
     };
     std::vector<Limit> memory_limits = {};  // those that the machine has

@@ -40,6 +40,9 @@ public:
         read_release();
         whole("resident_lanes", m_.resident_lanes);
         whole("block_lanes", m_.block_lanes);
+        whole_optional("registers", m_.registers);
+        whole_optional("shared_bytes", m_.shared_bytes);
+        whole_optional("l1_shared_bytes", m_.l1_shared_bytes);
         number("l1_transactions_per_clock", m_.l1_transactions_per_clock);
         whole("l1_bytes", m_.l1_bytes, 0);
         whole_optional("l1_line_bytes", m_.l1_line_bytes);
@@ -155,10 +158,12 @@ private:
             in_.fail("costs", "an entry without \"operation\" or \"instructions\"");
         for (const auto& [key, value] : entry.items())
             if (key != "operation" && key != "instructions" && key != "origin" && key != "kernel" &&
-                key != "most")
+                key != "most" && key != "half_rate")
                 in_.fail("costs", fmt::format("{} is not a field of an entry", key));
         OperationCost cost = cost_of(text(entry["operation"], "costs"), entry["instructions"]);
         if (entry.contains("most")) cost.most = cost_of(cost.operation, entry["most"]).instructions;
+        if (entry.contains("half_rate"))
+            cost.half_rate = cost_of(cost.operation, entry["half_rate"]).instructions;
         if (entry.contains("origin")) cost.origin = text(entry["origin"], "origin");
         if (!entry.contains("kernel")) return cost;
         cost.kernel = text(entry["kernel"], "kernel");

@@ -31,6 +31,8 @@ constexpr KindCounts kind_table[] = {
 double factor_of(const KindFactors& factors, Op op, std::size_t kind) {
     if (op == Op::ballot && kind == std::size_t(InstructionKind::vote)) return factors.ballot;
     if (op == Op::rank && kind == std::size_t(InstructionKind::count)) return factors.rank;
+    if (op == Op::exchange_ray && kind == std::size_t(InstructionKind::memory))
+        return factors.shared;
     return factors.of[kind];
 }
 

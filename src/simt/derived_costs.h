@@ -42,6 +42,7 @@ struct KindFactors {
     std::array<double, kind_count> of;
     double ballot;  // a vote whose mask is used
     double rank;    // a count of ones that gives a lane's rank
+    double shared;  // 16 bytes of shared memory a lane
 };
 
 /// sum of count * factor / places, rounded, for each operation of each kernel. The range's upper

@@ -23,7 +23,7 @@ MachineModel gtx285() {
         "Fermi white paper says is new there; 6 to 8 KB of texture cache for each multiprocessor, "
         "shared by three: Programming Guide; 80 texture units at 0.648 GHz: the maker's figures; "
         "261 clocks for a hit there, 371 in the second cache of 256 KB: Wong et al. 2010; rate of "
-        "the second cache: an estimate";
+        "the second cache: an estimate; 16 KB of shared memory: Programming Guide";
     m.multiprocessors = 30;
     m.clock_ghz = 1.476;
     m.lanes_per_clock = 8;
@@ -33,6 +33,7 @@ MachineModel gtx285() {
     m.block_release = BlockRelease::in_order;
     m.resident_lanes = 768;
     m.block_lanes = 192;
+    m.shared_bytes = 16 * 1024;
     m.l1_bytes = 0;
     m.l2_gb_per_s = 300;
     m.l2_bytes = 256 * 1024;
@@ -62,8 +63,9 @@ MachineModel gtx480() {
         "15 multiprocessors of 32 lanes at 1.401 GHz, 177 GB/s: Karras 2012; blocks of 128: Aila "
         "and Laine's release; 8 blocks in flight: Fermi's limit; 22 clocks between dependent "
         "instructions: CUDA C Programming Guide 4.2; blocks that end out of order: Fermi white "
-        "paper; 48 KB of L1, a line of 128 bytes in two clocks, further lines of a request issued "
-        "again: Programming Guide 4.2, F.4; nodes through it, triangles by texture: their release; "
+        "paper; 48 KB of L1 of 64 KB that it shares with blocks, a line of 128 bytes in two "
+        "clocks, further lines of a request issued again: Programming Guide 4.2, F.4; nodes "
+        "through it, triangles by texture: their release; "
         "12 KB of texture cache, four texture units at half the clock, 768 KB of L2: white paper; "
         "300 clocks for a read, clocks of each cache, rate of L2: estimates";
     m.multiprocessors = 15;
@@ -73,6 +75,8 @@ MachineModel gtx480() {
     m.read_clocks = 300;
     m.resident_lanes = 1024;
     m.block_lanes = 128;
+    m.shared_bytes = 48 * 1024;
+    m.l1_shared_bytes = 64 * 1024;
     m.l1_transactions_per_clock = 0.5;
     m.l1_bytes = 48 * 1024;
     m.l2_gb_per_s = 230;
@@ -107,6 +111,8 @@ MachineModel gtx680() {
     m.read_clocks = 105;
     m.resident_lanes = 2048;
     m.block_lanes = 128;
+    m.shared_bytes = 48 * 1024;
+    m.l1_shared_bytes = 64 * 1024;
     m.l1_transactions_per_clock = 1;
     m.l1_bytes = 48 * 1024;
     m.l2_gb_per_s = 512;
@@ -127,17 +133,23 @@ MachineModel h200() {
     MachineModel m;
     m.name = "h200";
     m.origin =
-        "132 multiprocessors of 128 lanes at 1.98 GHz, 4.8 TB/s, 50 MB of L2, up to 256 KB of L1: "
-        "the maker's figures; 1536 lanes in flight: 40 registers a thread, blocks of 128; integer "
-        "instructions, which run at half the rate, count as full ones; 4 clocks between dependent "
-        "instructions, 33 for a read, cache rates and clocks: estimates; sectors of 32 bytes";
+        "132 multiprocessors of 128 lanes at 1.98 GHz, 4.8 TB/s, 50 MB of L2, 256 KB of L1 of "
+        "which blocks take up to 228, 65,536 registers, 2048 lanes in flight: the maker's figures; "
+        "integer instructions, comparisons and minima at half the rate: CUDA C++ Programming "
+        "Guide; 128 bytes of L1 a clock in sectors of 32, of up to four lines: NVIDIA's developer "
+        "forum, on Volta; 4 clocks between dependent instructions, 33 for a read, rate of L2 and "
+        "clocks: "
+        "estimates";
     m.multiprocessors = 132;
     m.clock_ghz = 1.98;
     m.lanes_per_clock = 128;
     m.warp_issue_clocks = 4;
     m.read_clocks = 33;
-    m.resident_lanes = 1536;
+    m.resident_lanes = 2048;
     m.block_lanes = 128;
+    m.registers = 65'536;
+    m.shared_bytes = 228 * 1024;
+    m.l1_shared_bytes = 256 * 1024;
     m.l1_transactions_per_clock = 1;
     m.l1_bytes = 256 * 1024;
     m.l1_line_bytes = 32;

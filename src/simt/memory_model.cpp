@@ -20,6 +20,13 @@ std::uint64_t rounded(std::uint64_t bytes) {
     return (bytes + align_bytes - 1) / align_bytes * align_bytes;
 }
 
+void check_bytes(std::uint64_t bytes) {
+    if (bytes / sector_bytes >= 1u << 27)
+        throw InputError(
+            "the memory model takes less than 4 GiB of tree, rays, hits and stacks; these are " +
+            std::to_string(bytes) + " bytes");
+}
+
 }  // namespace
 
 std::uint64_t MemoryModel::set_out(std::span<const MemoryRange> ranges) {
@@ -33,11 +40,17 @@ std::uint64_t MemoryModel::set_out(std::span<const MemoryRange> ranges) {
         ranges_.push_back({begin, begin + range.bytes, at, texture});
         at += rounded(range.bytes);
     }
-    if (at / sector_bytes >= 1u << 27)
-        throw InputError(
-            "the memory model takes less than 4 GiB of tree, rays and hits; these are " +
-            std::to_string(at) + " bytes");
+    check_bytes(at);
     return at / sector_bytes;
+}
+
+void MemoryModel::add_stacks(const void* begin, std::uint64_t bytes) {
+    const std::uint64_t at =
+        ranges_.empty() ? 0
+                        : ranges_.back().at + rounded(ranges_.back().end - ranges_.back().begin);
+    check_bytes(at + rounded(bytes));
+    const auto first = reinterpret_cast<std::uintptr_t>(begin);
+    ranges_.push_back({first, first + bytes, at, false});
 }
 
 MemoryModel::MemoryModel(const MachineModel& machine, std::uint32_t width,
@@ -95,17 +108,20 @@ void MemoryModel::stack(const std::int32_t* entries, std::uint32_t lanes, Access
 
 void MemoryModel::count_requests(std::uint32_t lanes, std::uint32_t bytes) {
     const std::uint32_t word = std::min(bytes, word_bytes), together = request_bytes / word;
+    const std::uint32_t line_bytes = std::min(machine_.l1_line_bytes, request_bytes);
+    const std::uint64_t at_once = request_bytes / line_bytes;  // lines of one transaction
     for (std::uint32_t offset = 0; offset < bytes; offset += word)
         for (std::uint32_t first = 0; first < lanes; first += together) {
             numbers_.clear();
             for (std::uint32_t k = first; k < std::min(lanes, first + together); ++k) {
                 if (places_[k] == nowhere) continue;
-                const std::uint64_t line = (places_[k] + offset) / request_bytes;
+                const std::uint64_t line = (places_[k] + offset) / line_bytes;
                 if (std::find(numbers_.begin(), numbers_.end(), line) == numbers_.end())
                     numbers_.push_back(line);
             }
-            replay_.traffic.l1_requests += numbers_.size();
-            if (!numbers_.empty()) replay_.traffic.replays += numbers_.size() - 1;
+            const std::uint64_t requests = (numbers_.size() + at_once - 1) / at_once;
+            replay_.traffic.l1_requests += requests;
+            if (requests > 0) replay_.traffic.replays += requests - 1;
         }
 }
 

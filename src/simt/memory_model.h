@@ -26,6 +26,9 @@ public:
     MemoryModel(const MachineModel& machine, std::uint32_t width, std::uint32_t stack_entries,
                 std::span<const MemoryRange> ranges);
 
+    /// Stacks of rays that go from lane to lane. Such a kernel has no others.
+    void add_stacks(const void* begin, std::uint64_t bytes);
+
     /// What was observed since the last call was one warp's, on this multiprocessor.
     void hand_over(std::uint32_t multiprocessor);
     void finish() { replay_.finish(); }

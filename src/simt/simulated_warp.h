@@ -57,6 +57,7 @@ public:
     WarpMemory<Lane> memory{};
     OpCounts* tally = nullptr;  // of this warp, or of several that run one after the other
     MemoryObserver* observer = nullptr;
+    bool stacks_travel = false;  // with their rays: they lie apart, not side by side in lanes
 
     [[nodiscard]] static constexpr std::uint32_t width() { return Width; }
     [[nodiscard]] Mask active() const { return active_; }
@@ -118,6 +119,9 @@ public:
     template <class Entry>
     void touches_stack(Access how, Entry entry) {
         if (observer == nullptr) return;
+        if (stacks_travel)
+            return touches(
+                how, [&](const Lane& l) { return l.stack + entry(l); }, sizeof(std::int32_t));
         std::array<std::int32_t, Width> entries;
         entries.fill(-1);
         for (Mask left = active_; left != 0; left &= left - 1) {

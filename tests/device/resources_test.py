@@ -27,7 +27,7 @@ CORE = EVERY | dict.fromkeys((
     "LinkToParent", "LinkToChildren", "MarkLevels", "CenterInOrder", "MakeGrid", "FindKdRange", "EmitKdRootLeaf",
     "EmitKdNode", "FitKdIntervals"), 32)
 EXPECTED = {"kernels.cu": dict.fromkeys(PLAIN, 255), "device_build_cuda.cu": BUILD, "device_trees_cuda.cu": CORE}
-# Traversal: 40 registers leave room for 1536 threads, which the h200 of src/simt/machine_models.cpp has in flight.
+# Traversal: the simulated h200 keeps as many warps in flight as these registers leave room for (src/trace/warp/residency.cpp).
 KERNELS = {"trace_rays": 40, "trace_packets": 48, "trace_queues": 72, "trace_wide": 64, "trace_short_stack": 48}
 EXPECTED |= {"launch_warps_closest.cu": KERNELS, "launch_warps_any.cu": KERNELS,
              "device_trace_cuda.cu": {"StartPool": 32, "PrepareRay": 32, "RescaleHit": 32, "MissAll": 32, "EmitWoopTriangle": 48,

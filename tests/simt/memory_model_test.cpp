@@ -78,6 +78,35 @@ TEST(MemoryModel, AQuarterOfAWarpAsksForWordsOf16BytesAtOnce) {
     EXPECT_EQ(words.traffic().texture_fetches, 0u);
 }
 
+TEST(MemoryModel, FourSectorsOfAnyLinesAreOneTransaction) {
+    MachineModel m = machine();
+    m.l1_line_bytes = 32;
+    MemoryModel same = model_of(m, MemoryRange::Holds::nodes);
+    read_as_one_warp(same, every(0), 64);
+    EXPECT_EQ(same.traffic().l1_requests, 4u * 4);
+    MemoryModel apart = model_of(m, MemoryRange::Holds::nodes);
+    read_as_one_warp(apart, every(128), 64);
+    EXPECT_EQ(apart.traffic().l1_requests, 4u * 4 * 2);  // eight sectors of a quarter's word
+    EXPECT_EQ(apart.traffic().replays, 4u * 4);
+    EXPECT_EQ(apart.traffic().l2_bytes, 32u * 64);
+}
+
+TEST(MemoryModel, StacksThatTravelLieWhereTheyAre) {
+    const MachineModel m = machine();
+    MemoryModel model = model_of(m, MemoryRange::Holds::nodes);
+    alignas(256) static std::byte stacks[width * 256];
+    model.add_stacks(stacks, sizeof(stacks));
+    Addresses tops;
+    for (std::size_t k = 0; k < width; ++k) tops[k] = stacks + 256 * k;
+    read_as_one_warp(model, tops, 4);
+    EXPECT_EQ(model.traffic().l1_requests, 32u);  // a line each, where lanes' own share one
+    EXPECT_EQ(model.traffic().dram_bytes, 32u * 128);
+    Addresses crossed = tops;  // the same by other lanes: as far as the second cache
+    for (std::size_t k = 0; k < width; ++k) crossed[k] = tops[width - 1 - k];
+    read_as_one_warp(model, crossed, 4);
+    EXPECT_EQ(model.traffic().dram_bytes, 32u * 128);
+}
+
 TEST(MemoryModel, WaitsForWhatHoldsTheValue) {
     const MachineModel m = machine();
     MemoryModel model = model_of(m, MemoryRange::Holds::nodes);

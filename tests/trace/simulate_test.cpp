@@ -348,6 +348,26 @@ TEST(Simulate, FiguresDoNotDependOnThreads) {
     }
 }
 
+TEST(Simulate, WhatHalfOfTheLanesExecuteTakesTwice) {
+    const Model scene = scene_of(random_soup(500, 4, 0.1f), "soup");
+    const WarpTree tree(build_bvh(scene.mesh()));
+    const std::vector<Ray> rays = make_mixed_rays(scene, 4096, 8);
+    SimulateOptions run = options_for(WarpKernel::while_while);
+    run.memory = true;
+    const auto limit = [&] {
+        const Simulation s = simulate(tree, rays, std::span(&run, 1)).front();
+        const SimulatedRates rates = simulated_rates(s, run);
+        for (const SimulatedRates::Limit& l : rates.memory_limits)
+            if (l.name == "half_rate") return l.mrays_per_s / rates.bound;
+        return 0.0;
+    };
+    EXPECT_EQ(limit(), 0.0);  // a machine that has none
+    for (OperationCost& cost : run.machine.costs) cost.half_rate = cost.instructions;
+    EXPECT_NEAR(limit(), 0.5, 1e-12);
+    for (OperationCost& cost : run.machine.costs) cost.instructions = 4, cost.half_rate = 1;
+    EXPECT_NEAR(limit(), 2.0, 1e-12);
+}
+
 TEST(Simulate, PersistentFormsDifferByTheirFetchesOnly) {
     const Model scene = scene_of(random_soup(2000, 4, 0.1f), "soup");
     const WarpTree tree(build_bvh(scene.mesh()));
@@ -533,6 +553,11 @@ TEST(Simulate, RefusesWhatItCannotRun) {
         for (OperationCost& cost : o.machine.costs)
             if (cost.operation == "push") cost.instructions = 9, cost.most = 3;
     });
+    refuse("half_rate of 'push' is 10; it must be at most its instructions, 9",
+           [](SimulateOptions& o) {
+               for (OperationCost& cost : o.machine.costs)
+                   if (cost.operation == "push") cost.instructions = 9, cost.half_rate = 10;
+           });
     refuse("block_lanes is 4096; it must be at most resident_lanes, 1024",
            [](SimulateOptions& o) { o.machine.block_lanes = 4096; });
     refuse("resident_lanes is 16; it must be a multiple of the warp's width, 32",

@@ -32,6 +32,7 @@ public:
         : stride_(kernel.warp_bytes(setup.stack_entries)), memory_(stride_ * warps) {
         for (std::size_t k = 0; k < warps; ++k) kernel.start_warp(at(k), setup);
     }
+    [[nodiscard]] std::uint64_t bytes() const { return memory_.size(); }
     [[nodiscard]] std::byte* at(std::size_t k) { return memory_.data() + k * stride_; }
 
 private:

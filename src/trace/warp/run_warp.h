@@ -27,14 +27,18 @@ struct SpareRays {
 };
 
 /// Twice as many rays as lanes: thread `thread` of the launch has two of `stacks`, for its own ray
-/// and for one that waits.
+/// and for one that waits. No spare is a ray yet.
 template <class Warp>
 RAYDIX_HD void lend_spares(Warp& warp, SpareRays& spares, std::int32_t* stacks, std::size_t thread,
                            std::uint32_t stack_entries) {
     warp.memory.spares = spares.lanes;
     warp.memory.slots = spares.slots;
     warp.lane.stack = stacks + 2 * thread * stack_entries;
-    spares.lanes[warp.lane_id()].stack = warp.lane.stack + stack_entries;
+    Lane& spare = spares.lanes[warp.lane_id()];
+    spare.node = finished_node;
+    spare.ray = no_ray;
+    spare.stack = warp.lane.stack + stack_entries;
+    warp.meet();
 }
 
 }  // namespace raydix

@@ -14,6 +14,7 @@
 #include "trace/warp/batch_work.h"
 #include "trace/warp/kernel_list.h"
 #include "trace/warp/prepare_rays.h"
+#include "trace/warp/residency.h"
 #include "trace/warp/simulate_launch.h"
 #include "trace/warp/warp_scene.h"
 
@@ -68,10 +69,15 @@ void check_together(const MachineModel& m, int width) {
     if (m.block_lanes > m.resident_lanes)
         refuse("block_lanes is " + std::to_string(m.block_lanes) +
                "; it must be at most resident_lanes, " + std::to_string(m.resident_lanes));
-    for (const OperationCost& cost : m.costs)
+    for (const OperationCost& cost : m.costs) {
+        if (cost.half_rate > cost.instructions)
+            refuse("costs: half_rate of '" + cost.operation + "' is " +
+                   std::to_string(cost.half_rate) + "; it must be at most its instructions, " +
+                   std::to_string(cost.instructions));
         if (cost.most != 0 && cost.most < cost.instructions)
             refuse("costs: most of '" + cost.operation + "' is " + std::to_string(cost.most) +
                    "; it must be at least its instructions, " + std::to_string(cost.instructions));
+    }
 }
 
 void check_options(const SimulateOptions& options) {
@@ -282,9 +288,17 @@ void Simulation::add(const Simulation& other) {
 
 namespace {
 
+/// Instructions that half of the lanes execute, in all.
+std::uint64_t half_rate_instructions(const Simulation& s, const SimulateOptions& options) {
+    const OpCosts half = op_half_rates(options.machine, options.kernel);
+    std::uint64_t sum = 0;
+    for (std::size_t k = 0; k < s.operations.size(); ++k) sum += s.operations[k].issues * half[k];
+    return sum;
+}
+
 std::vector<SimulatedRates::Limit> memory_limits(const Simulation& s,
                                                  const SimulateOptions& options) {
-    const MachineModel& m = options.machine;
+    const MachineModel m = machine_for(options);
     std::vector<SimulatedRates::Limit> limits;
     const double clocks_per_us = m.clock_ghz * 1e3 * m.multiprocessors;
     const auto add = [&](std::string_view name, double us) {
@@ -299,6 +313,9 @@ std::vector<SimulatedRates::Limit> memory_limits(const Simulation& s,
     if (m.l1_bytes > 0)
         add("l1",
             static_cast<double>(s.l1_transactions) / m.l1_transactions_per_clock / clocks_per_us);
+    const std::uint64_t half = half_rate_instructions(s, options);
+    add("half_rate",
+        static_cast<double>(2 * half) * options.width / m.lanes_per_clock / clocks_per_us);
     add("l2", static_cast<double>(s.l2_bytes) / (m.l2_gb_per_s * 1e3));
     add("dram", static_cast<double>(s.dram_bytes) / (m.dram_gb_per_s * 1e3));
     // Warps in flight, each with its own instructions and waits one after the other.
@@ -367,9 +384,9 @@ BatchWork batch_work(const WarpScene& scene, std::uint32_t stack_entries, std::s
 }  // namespace
 
 std::vector<Simulation> simulate(const WarpTree& tree, std::span<const Ray> rays,
-                                 std::span<const SimulateOptions> runs,
+                                 std::span<const SimulateOptions> asked,
                                  std::vector<std::vector<TreeHit>>* hits, int threads) {
-    for (const SimulateOptions& options : runs) {
+    for (const SimulateOptions& options : asked) {
         check_options(options);
         static_cast<void>(op_costs(options.machine, options.kernel));
         if (reads_wide_nodes(options.kernel) && !tree.empty() && !tree.has_wide_nodes())
@@ -379,6 +396,8 @@ std::vector<Simulation> simulate(const WarpTree& tree, std::span<const Ray> rays
         check_trail_levels(options.kernel, tree.max_depth());
     }
     check_threads(threads);
+    std::vector<SimulateOptions> runs(asked.begin(), asked.end());
+    for (SimulateOptions& run : runs) run.machine = machine_for(run);
     if (rays.size() >= 0x7FFFFFFFu) throw InputError("simulate: 2^31 rays or more in one launch");
     std::vector<Simulation> figures(runs.size());
     std::vector<std::vector<TreeHit>> own;

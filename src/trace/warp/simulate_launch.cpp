@@ -165,6 +165,8 @@ void run_persistent(const LaunchRun& run, const BatchWork* batches, Simulation& 
     OpCounts tally{};
     WarpMemoryPool memory(run.kernel, run.kernel.keeps_rays ? warps : 1,
                           {&tally, run.memory.get(), run.stack_entries});
+    if (run.memory && run.kernel.stacks_travel)
+        run.memory->add_stacks(memory.at(0), memory.bytes());
     std::vector<KernelState> states(warps);
     std::vector<double> lives(warps);
     std::vector<bool> done(warps);
@@ -234,8 +236,10 @@ Simulation empty_figures(const OpCosts& costs) {
 
 }  // namespace
 
-OpCosts op_costs(const MachineModel& machine, WarpKernel kernel) {
-    OpCosts costs{};
+namespace {
+
+/// The row of a machine's table that holds for the kernel, of each operation.
+std::vector<const OperationCost*> table_of(const MachineModel& machine, WarpKernel kernel) {
     std::vector<const OperationCost*> found(op_count);
     std::set<std::pair<std::string_view, std::string_view>> seen;
     const std::string told = "machine " + machine.name + ": operation '";
@@ -252,13 +256,29 @@ OpCosts op_costs(const MachineModel& machine, WarpKernel kernel) {
         const auto k = static_cast<std::size_t>(name - op_names.begin());
         if (own || found[k] == nullptr) found[k] = &cost;
     }
-    for (std::size_t k = 0; k < op_count; ++k) {
+    for (std::size_t k = 0; k < op_count; ++k)
         if (found[k] == nullptr)
             throw InputError(told + std::string(op_names[k]) + "' has no cost in kernel " +
                              std::string(warp_kernel_name(kernel)));
-        costs[k] = found[k]->instructions;
-    }
+    return found;
+}
+
+OpCosts column_of(const MachineModel& machine, WarpKernel kernel,
+                  std::uint32_t OperationCost::*column) {
+    const std::vector<const OperationCost*> table = table_of(machine, kernel);
+    OpCosts costs{};
+    for (std::size_t k = 0; k < op_count; ++k) costs[k] = table[k]->*column;
     return costs;
+}
+
+}  // namespace
+
+OpCosts op_costs(const MachineModel& machine, WarpKernel kernel) {
+    return column_of(machine, kernel, &OperationCost::instructions);
+}
+
+OpCosts op_half_rates(const MachineModel& machine, WarpKernel kernel) {
+    return column_of(machine, kernel, &OperationCost::half_rate);
 }
 
 Simulation simulate_launch(const WarpScene& scene, std::uint32_t stack_entries,

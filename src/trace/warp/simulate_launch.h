@@ -16,6 +16,8 @@ namespace raydix {
 /// Of a machine's table: the kernel's own counts, and for the rest those of all kernels. Throws
 /// InputError if an operation is missing, repeated or unknown, or a kernel is unknown.
 [[nodiscard]] OpCosts op_costs(const MachineModel& machine, WarpKernel kernel);
+/// Of these, the instructions that half of the lanes execute.
+[[nodiscard]] OpCosts op_half_rates(const MachineModel& machine, WarpKernel kernel);
 
 /// rays [n], prepared (prepare_rays.h), fewer than 2^31 -> hits [n]. `stack_entries`: at least the
 /// tree's depth. `memory`: the scene's arrays, for the memory model. `batches`: what the rays make

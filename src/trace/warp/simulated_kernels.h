@@ -26,9 +26,10 @@ struct alignas(8) KernelState {
 };
 
 struct SimulatedKernel {
-    bool persistent;    // warps fetch from the pool; else warp k has batch k
-    bool keeps_rays;    // lanes are in use from one turn to the next
-    bool local_stacks;  // lanes pop from stacks in memory, each from its own
+    bool persistent;     // warps fetch from the pool; else warp k has batch k
+    bool keeps_rays;     // lanes are in use from one turn to the next
+    bool local_stacks;   // lanes pop from stacks in memory, each from its own
+    bool stacks_travel;  // with their rays, from lane to lane
     /// Memory of one warp, lanes and stacks, aligned to 64.
     std::size_t (*warp_bytes)(std::uint32_t stack_entries);
     void (*start_warp)(std::byte* warp, const WarpSetup& setup);

@@ -59,6 +59,7 @@ struct SimulatedKernelOf {
             stack += setup.stack_entries;
         }
         if (Kernel::rays_per_lane == 1) return;
+        warp.stacks_travel = true;
         Spares& spares = *new (shared) Spares{};
         warp.memory.spares = spares.lanes.data();
         warp.memory.slots = spares.slots.data();
@@ -90,6 +91,7 @@ struct SimulatedKernelOf {
         Kernel::persistent,
         Kernel::keeps_rays,
         !Kernel::one_stack && !stack_in_registers<Kernel>,
+        Kernel::rays_per_lane == 2,
         &warp_bytes,
         &start_warp,
         &start_kernel,

@@ -33,15 +33,6 @@ public:
 
     template <bool any_hit, class Warp>
     RAYDIX_HD bool turn(Warp& warp, const WarpJob& job, std::uint32_t) {
-        if (!started_) {
-            warp.step_indexed(Op::exchange_ray, [&](const Lane&, std::uint32_t lane) {
-                warp.memory.spares[lane].node = finished_node;
-                warp.memory.spares[lane].ray = no_ray;
-            });
-            warp.meet();
-            started_ = true;
-            wanted_ = Want::fetch;
-        }
         if (wanted_ == Want::fetch) fetch(warp, job.launch);
         // To the next fetch, which opens the next turn.
         warp.uniform_loop(
@@ -168,7 +159,7 @@ private:
     RAYDIX_HD static int lesser_count(int a, int b) { return a < b ? a : b; }
 
     Want wanted_ = Want::fetch;
-    bool started_ = false, dry_ = false, none_left_ = false;
+    bool dry_ = false, none_left_ = false;
 };
 
 }  // namespace raydix
