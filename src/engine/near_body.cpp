@@ -1,6 +1,7 @@
 #include "engine/near_body.h"
 
 #include <algorithm>
+#include <exception>
 #include <utility>
 
 #include "engine/scene_state.h"
@@ -37,25 +38,51 @@ std::shared_ptr<const NearBodyD> make_body(const SceneD& scene, std::uint32_t ma
     return body;
 }
 
+/// The place of what is made for a mask; the first one goes where there are too many.
+std::shared_ptr<KeptBodies::Body> kept_for(KeptBodies& kept, std::uint32_t mask) {
+    const std::lock_guard lock(kept.asked);
+    const auto known =
+        std::ranges::find_if(kept.known, [&](const auto& k) { return k->mask == mask; });
+    if (known != kept.known.end()) return *known;
+    if (kept.known.size() == most_bodies) kept.known.erase(kept.known.begin());
+    auto made = std::make_shared<KeptBodies::Body>();
+    made->mask = mask;
+    kept.known.push_back(made);
+    return made;
+}
+
+void forget(KeptBodies& kept, const std::shared_ptr<KeptBodies::Body>& body) {
+    const std::lock_guard lock(kept.asked);
+    std::erase(kept.known, body);
+}
+
 }  // namespace
 
 std::shared_ptr<const NearBodyD> near_body_of(const SceneD& scene, std::uint32_t mask,
                                               NearCall call, ResultBudget* budget) {
     const SceneTreeD& tree = *SceneInternalsD::tree(scene);
-    KeptBodies& kept = *tree.bodies;
     const std::uint32_t shown = same_for_all(tree, mask);
-    const std::lock_guard lock(kept.asked);
-    const auto known = std::ranges::find(kept.known, shown, &KeptBodies::Body::mask);
-    if (known != kept.known.end()) {
-        known->body->shapes.require_answers(call);
-        return known->body;
+    while (true) {
+        const std::shared_ptr<KeptBodies::Body> found = kept_for(*tree.bodies, shown);
+        bool mine = false;
+        std::call_once(found->made, [&] {
+            mine = true;
+            try {
+                // A thread that waits for loops in it must not take up another query of the same
+                // scene.
+                isolated([&] { found->body = make_body(scene, shown, call, budget); });
+            } catch (...) {
+                found->failed = std::current_exception();
+            }
+        });
+        if (!found->failed) {
+            found->body->shapes.require_answers(call);
+            return found->body;
+        }
+        forget(*tree.bodies, found);
+        // Whoever waited for another one's body has limits of its own.
+        if (mine) std::rethrow_exception(found->failed);
     }
-    std::shared_ptr<const NearBodyD> body;
-    // A thread that waits for loops in it must not take up another query of the same scene.
-    isolated([&] { body = make_body(scene, shown, call, budget); });
-    if (kept.known.size() == most_bodies) kept.known.erase(kept.known.begin());
-    kept.known.push_back({shown, body});
-    return body;
 }
 
 }  // namespace raydix

@@ -7,6 +7,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <exception>
 #include <memory>
 #include <mutex>
 #include <vector>
@@ -62,10 +63,12 @@ struct NearBodyD;  // near_body.h
 struct KeptBodies {
     struct Body {
         std::uint32_t mask;
-        std::shared_ptr<const NearBodyD> body;
+        std::once_flag made;  // unlike a mutex it is whole in a child that is forked off meanwhile
+        std::shared_ptr<const NearBodyD> body = {};
+        std::exception_ptr failed = {};
     };
     std::mutex asked;
-    std::vector<Body> known;
+    std::vector<std::shared_ptr<Body>> known;
 };
 
 struct SceneTreeD {

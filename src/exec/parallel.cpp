@@ -3,6 +3,9 @@
 
 #include "exec/parallel.h"
 
+#if __has_include(<pthread.h>)
+#include <pthread.h>
+#endif
 #include <raydix/thread_pool.h>
 #include <tbb/blocked_range.h>
 #include <tbb/global_control.h>
@@ -11,6 +14,7 @@
 #include <tbb/task_group.h>
 
 #include <algorithm>
+#include <atomic>
 #include <utility>
 
 #include "base/float_env.h"
@@ -22,6 +26,21 @@ namespace raydix {
 namespace {
 
 thread_local bool inside_range = false;
+
+// A forked child has none of oneTBB's workers, and finds its locks as other threads held them.
+std::atomic<bool> onetbb_was_used{false}, workers_are_gone{false};
+#if __has_include(<pthread.h>)
+[[maybe_unused]] const int at_fork = pthread_atfork(nullptr, nullptr, [] {
+    if (onetbb_was_used) workers_are_gone = true;
+});
+#endif
+
+/// Whether loops may go to oneTBB, which counts as used from then on.
+bool onetbb_serves() {
+    if (workers_are_gone) return false;
+    onetbb_was_used = true;
+    return true;
+}
 
 /// A range that this thread runs.
 class Range {
@@ -54,7 +73,7 @@ void with_threads(int threads, const std::function<void()>& body) {
         with_job_limit(threads, body);
         return;
     }
-    if (threads == 0) {
+    if (threads == 0 || !onetbb_serves()) {
         run_here(body);
         return;
     }
@@ -79,12 +98,15 @@ void with_threads(int threads, const std::function<void()>& body) {
 void isolated(const std::function<void()>& body) {
     if (pool_is_used())
         as_job(body);  // a pool may run any of its tasks while a loop waits
+    else if (!onetbb_serves())
+        body();
     else
         tbb::this_task_arena::isolate(body);
 }
 
 int thread_count() {
-    return pool_is_used() ? pool_threads() : tbb::this_task_arena::max_concurrency();
+    if (pool_is_used()) return pool_threads();
+    return onetbb_serves() ? tbb::this_task_arena::max_concurrency() : 1;
 }
 
 bool has_onetbb() { return true; }
