@@ -11,7 +11,8 @@
    are copied.
 
    Threads: any number of threads may ask one handle at once (const in the declaration). Calls that
-   change a handle need it for themselves.
+   change a handle need it for themselves. To commit a scene, or to add one to another, also needs
+   that no scene below changes meanwhile.
 
    Units: coordinates are float, in the caller's unit (raydix_c_double.h has the same calls in
    double); distances are in that unit, and never squared. t of a ray is in units of its direction,

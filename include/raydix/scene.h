@@ -95,7 +95,8 @@ struct CommitReport {
 ///
 /// Changes take effect with `commit`. Until then rays and queries meet what the last commit saw.
 /// Any number of threads may trace one scene and ask it at once. Changes and commits need the scene
-/// for themselves. They do not disturb rays through other scenes in which this one stands: those
+/// for themselves, and `commit` and the `add` of a scene also need that no scene below changes
+/// meanwhile. They do not disturb rays through other scenes in which this one stands: those
 /// meet what their own last commit saw.
 ///
 /// Triangles and shapes that are not finite or out of range are left out (docs/contract.md 1): rays

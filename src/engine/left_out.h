@@ -23,18 +23,21 @@ inline TriangleSourceD source_of(const MeshViewD& mesh) {
 inline BoxSource source_of(std::span<const Aabb> boxes) { return {boxes.data()}; }
 inline BoxSourceD source_of(std::span<const AabbD> boxes) { return {boxes.data()}; }
 
-/// Names the first primitive that builders leave out, of n of which they left out `count`. Returns
-/// if they leave out none.
+/// Names the first of n primitives that builders leave out, and tells how many others they do.
+/// Returns if they leave out none.
 template <class Box, class Source>
-void refuse_left_out(std::uint32_t geometry, const char* kind, const Source& source, std::size_t n,
-                     std::uint64_t count) {
+void refuse_left_out(std::uint32_t geometry, const char* kind, const Source& source,
+                     std::size_t n) {
+    std::uint64_t count = 0;
+    std::uint32_t first = 0;
     for (std::uint32_t i = 0; i < n; ++i) {
         Box box;
-        if (source.box(i, box)) continue;
-        throw InputError("geometry " + std::to_string(geometry) + ": " + kind + ' ' +
-                         std::to_string(i) + ": not finite, out of range or inverted" +
-                         (count > 1 ? ", as are " + std::to_string(count - 1) + " others" : ""));
+        if (!source.box(i, box) && count++ == 0) first = i;
     }
+    if (count == 0) return;
+    throw InputError("geometry " + std::to_string(geometry) + ": " + kind + ' ' +
+                     std::to_string(first) + ": not finite, out of range or inverted" +
+                     (count > 1 ? ", as are " + std::to_string(count - 1) + " others" : ""));
 }
 
 }  // namespace raydix

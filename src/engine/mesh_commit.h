@@ -157,8 +157,7 @@ private:
         using Box = BasicAabb<Scalar>;
         for (const std::uint32_t id : tree.ids) {
             const MeshView& mesh = mesh_of(id);
-            refuse_left_out<Box>(id, "triangle", source_of(mesh), mesh.triangles.size(),
-                                 tree.left_out);
+            refuse_left_out<Box>(id, "triangle", source_of(mesh), mesh.triangles.size());
         }
     }
 

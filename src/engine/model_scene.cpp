@@ -196,21 +196,20 @@ private:
 template <class Scalar>
 BasicScene<Scalar>::BasicScene(const Model& model, const SceneOptions& options) : BasicScene() {
     const FloatEnvironment plain;
-    if (model.is_flat()) {
-        add(mesh_as<Scalar>(model.mesh()));
-        commit(options);
-        return;
-    }
+    const bool flat = model.is_flat();
     try {
-        if (model.nodes.empty()) {
+        if (flat) {
+            add(mesh_as<Scalar>(model.mesh()));
+            commit(options);
+        } else if (model.nodes.empty()) {
             for (std::uint32_t i = 0; i < model.meshes.size(); ++i) add_mesh(*this, model, i);
             commit(options);
         } else {
             NodeScenes<Scalar>(model, options).place(*this);
         }
     } catch (const InputError& error) {
-        throw InputError(model.name + ": " + error.what() +
-                         " (Model::flatten, --flatten makes one mesh of it)");
+        throw InputError((model.name.empty() ? "" : model.name + ": ") + error.what() +
+                         (flat ? "" : " (Model::flatten, --flatten makes one mesh of it)"));
     }
 }
 

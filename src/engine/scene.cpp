@@ -363,7 +363,9 @@ template <class Scalar>
 std::uint32_t BasicScene<Scalar>::add(const BasicScene& scene, const Transform& transform,
                                       const GeometryOptions& options) {
     const std::uint32_t id = new_id(*state_, options.id);
-    if (scene.state_->holds(state_.get()))
+    // A scene that only its handle has stands in no other one.
+    if (scene.state_ == state_ ||
+        (state_.use_count() > 1 && scene.state_->holds(state_.get())))
         throw InputError("instance " + std::to_string(id) + ": the scene would hold itself");
     typename State::Geometry geometry;
     geometry.mask = options.mask;

@@ -66,7 +66,8 @@ struct SceneLevel {
     /// No rays, and room for `most`.
     void begin(std::size_t most, bool with_lines) {
         count = 0;
-        if (rays.size() < most) rays.resize(most), sources.resize(most);
+        // The last to grow is asked: memory may have ended before.
+        if (sources.size() < most) rays.resize(most), sources.resize(most);
         if (with_lines && lines.size() < most) lines.resize(most);
     }
 };
@@ -77,7 +78,7 @@ public:
     /// None yet, and room for `most`.
     void begin(std::uint32_t most) {
         count_ = 0;
-        if (rays_.size() < most)
+        if (hits_.size() < most)  // the last to grow
             rays_.resize(most), places_.resize(most), sources_.resize(most), hits_.resize(most);
     }
     /// `number`: of the ray in its level; `scale`: t of the caller's ray = scale * t of this one.

@@ -55,7 +55,7 @@ public:
             report_.bytes += shapes->bytes();
             const std::uint64_t left_out = count - shapes->part.size();
             report_.left_out += left_out;
-            if (options_.strict && left_out != 0) refuse(id, *geometry->shapes, left_out);
+            if (options_.strict && left_out != 0) refuse(id, *geometry->shapes);
         }
         return all > 0 ? done / all : 0;
     }
@@ -79,13 +79,12 @@ private:
             throw InputError("geometry " + std::to_string(id) + ": " + error.what());
         }
     }
-    static void refuse(std::uint32_t id, const BasicShapes<Scalar>& shapes,
-                       std::uint64_t left_out) {
+    static void refuse(std::uint32_t id, const BasicShapes<Scalar>& shapes) {
         using Box = BasicAabb<Scalar>;
         const std::vector<Box> boxes = boxes_of<Scalar>(shapes);
         constexpr const char* kinds[] = {"sphere", "capsule", "point", "primitive"};
         refuse_left_out<Box>(id, kinds[shapes.index()], source_of(std::span<const Box>(boxes)),
-                             boxes.size(), left_out);
+                             boxes.size());
     }
     [[nodiscard]] std::shared_ptr<const ShapeTree> last_of(std::uint32_t id) const {
         if (state_.tree == nullptr) return nullptr;

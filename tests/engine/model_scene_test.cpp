@@ -340,5 +340,17 @@ TEST(ModelScene, OneMeshIsWantedWhereThereAreMore) {
     EXPECT_TRUE(model.mesh().triangles.empty());
 }
 
+TEST(ModelScene, ErrorsOfOneMeshNameTheModelToo) {
+    Model model;
+    model.name = "cloud.ply";
+    model.meshes.push_back({"", {{0, 0, 0}, {1, 0, 0}}, {}});
+    ASSERT_TRUE(model.is_flat());
+    EXPECT_EQ(test::message_of([&] { static_cast<void>(Scene(model)); }),
+              "cloud.ply: geometry 0: vertices without triangles");
+    model.name.clear();
+    EXPECT_EQ(test::message_of([&] { static_cast<void>(Scene(model)); }),
+              "geometry 0: vertices without triangles");
+}
+
 }  // namespace
 }  // namespace raydix

@@ -361,5 +361,22 @@ TEST(Scene, OneRayOfACallerThatFlushesDenormals) {
 }
 #endif
 
+TEST(SceneBounds, HoldTrianglesWithoutArea) {
+    const Mesh good{"", {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}};
+    const Mesh flat{"", {{5, 5, 5}, {6, 5, 5}, {7, 5, 5}}, {{0, 1, 2}}};
+    for (const Usage usage : {Usage::fixed, Usage::moving}) {
+        Scene both, alone;
+        both.add(good);
+        both.add(flat);
+        both.commit({.usage = usage});
+        EXPECT_EQ(both.bounds().hi, (Vec3{7, 5, 5}));
+        EXPECT_EQ(both.bounds().lo, (Vec3{0, 0, 0}));
+        alone.add(flat);
+        alone.commit({.usage = usage});
+        EXPECT_EQ(alone.bounds().lo, (Vec3{5, 5, 5}));
+        EXPECT_EQ(alone.bounds().hi, (Vec3{7, 5, 5}));
+    }
+}
+
 }  // namespace
 }  // namespace raydix

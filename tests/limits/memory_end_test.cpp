@@ -11,6 +11,7 @@
 #include <new>
 #include <span>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "exec/memory.h"
@@ -149,6 +150,51 @@ TEST(MemoryEndsInDepth, RefitLeavesTheTreeAsItWas) {
                                   [&] { ASSERT_TRUE(are_equal(nodes, tree.nodes())); });
     EXPECT_GE(ends, 4);
     EXPECT_TRUE(are_equal(nodes, usual));
+}
+
+/// Or the next trace of that thread wrote past what it had kept from the one that failed.
+TEST(MemoryEndsInATrace, TheNextOneOfTheThreadIsWhole) {
+    const Mesh mesh = test::random_soup(300, 4, 0.2f);
+    Scene inner(mesh), flat(mesh), placed, balls;
+    placed.add(inner, Transform{});
+    placed.add(inner, Transform{});
+    placed.add(mesh);
+    std::vector<Aabb> boxes;
+    for (const Triangle& t : mesh.triangles) {
+        boxes.push_back(empty_box());
+        for (const std::uint32_t corner : t)
+            boxes.back() = unite(boxes.back(), Aabb{mesh.vertices[corner], mesh.vertices[corner]});
+    }
+    balls.add(UserGeometry(boxes, [](std::uint32_t, const Ray&, Hit& hit) {
+        hit.t = 0.5f;
+        return true;
+    }));
+    balls.add(mesh);
+    placed.commit();
+    balls.commit();
+    std::vector<Ray> rays;
+    for (std::uint32_t k = 0; k < 2000; ++k)
+        rays.push_back({{float(k % 50) / 50, float(k) / 2000, -1}, 0, {0.1f, 0.2f, 1}, infinity});
+    for (const Scene* scene : {&flat, &placed, &balls})
+        for (const SimdPath path : {SimdPath::automatic, SimdPath::single, SimdPath::packet,
+                                    SimdPath::stream, SimdPath::sorted}) {
+            const SceneTraceOptions options{.threads = 1, .path = path};
+            const std::vector<Hit> wanted = trace(*scene, rays, options);
+            bool ended = true;
+            for (long k = 0; ended; ++k)
+                std::thread([&] {
+                    std::vector<Hit> hits(rays.size());
+                    ended = false;
+                    try {
+                        const MemoryEnd end(k);
+                        trace(*scene, rays, hits, options);
+                    } catch (const std::bad_alloc&) {
+                        ended = true;
+                    }
+                    trace(*scene, rays, hits, options);
+                    EXPECT_EQ(hits, wanted) << k;
+                }).join();
+        }
 }
 
 }  // namespace

@@ -44,7 +44,7 @@ public:
     StackMemory() = default;
     void reserve(std::uint32_t max_depth) { reserve_words(wide_stack_capacity(max_depth)); }
     void reserve_words(std::size_t n) {
-        if (n <= words_.size()) return;
+        if (n <= pairs_.size()) return;  // the last to grow: memory may have ended before
         words_.resize(n), entries_.resize(n), pairs_.resize(n);
     }
     [[nodiscard]] WideStackView view() { return {words_.data(), entries_.data(), pairs_.data()}; }
