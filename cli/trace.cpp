@@ -220,9 +220,7 @@ void save_kept(const TraceCommand& options, Mode mode, const Kept& kept, HitFiel
     if (options.hits_file.empty()) return;
     if (mode == Mode::any) return save_occluded(options.hits_file, kept.occluded);
     save_hits(options.hits_file, kept.hits, fields);
-    if (mode == Mode::all)
-        save_offsets(std::filesystem::path(options.hits_file).replace_extension(".offsets.npy"),
-                     kept.offsets);
+    if (mode == Mode::all) save_offsets(offsets_file(options.hits_file), kept.offsets);
 }
 
 RayKind ray_kind(const std::string& name) {

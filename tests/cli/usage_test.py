@@ -3,12 +3,13 @@ import json
 import os
 import pty
 import stat
+import struct
 import subprocess
 import sys
 import time
 
 sys.dont_write_bytecode = True
-from program import COMMANDS, PROGRAM, TIME_LIMIT_S, TRIANGLE, ProgramTest, json_of, main, ply  # noqa: E402
+from program import COMMANDS, PROGRAM, TIME_LIMIT_S, TRIANGLE, ProgramTest, json_of, main, ply, write_npy  # noqa: E402
 
 COMMON = ["--json", "--threads", "--quiet", "--seed"]
 TREE = ["--tree", "--builder", "--quality", "--bits", "--max-leaf", "--max-level", "--fit", "--layout", "--device", "--strict",
@@ -288,6 +289,38 @@ class Usage(ProgramTest):
         self.succeed("build", "again.rdx", "-o", "again.rdx")  # a tree may be built anew in its place
         self.succeed("check", "again.rdx")
         self.succeed(*rays, "--hits", "/dev/null", "--json", "/dev/null", "--quiet")
+
+    def test_files_that_a_name_stands_for_are_not_replaced(self):
+        (self.folder / "implied").mkdir()
+        camera = {"name": "c", "position": [0, 0, 3], "target": [0, 0, 0], "up": [0, 1, 0], "vfov": 40}
+        mesh = self.write("implied/mesh.ply", TRIANGLE)
+        gltf = self.write("implied/s.gltf", json.dumps({
+            "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+            "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+            "bufferViews": [{"buffer": 0, "byteLength": 36}], "buffers": [{"byteLength": 36, "uri": "a%20b.bin"}]}))
+        buffer = self.write("implied/a b.bin", struct.pack("<9f", 0, 0, 0, 1, 0, 0, 0, 1, 0))
+        cameras = self.write("implied/cameras.json", json.dumps([camera]))
+        queries = str(self.folder / "implied/w.distances.npy")
+        write_npy(queries, "<f4", (1, 3), struct.pack("<3f", 0, 0, 0))
+        before = {file.name: file.read_bytes() for file in (self.folder / "implied").iterdir()}
+        trace = ["--size", "4x4", "--repeat", "1"]
+        out = str(self.folder / "implied/w")
+        for arguments, names in ((["trace", mesh, *trace, "--json", cameras], ["cameras.json", "SCENE"]),
+                                 (["trace", gltf, *trace, "--hits", buffer], ["--hits", "a b.bin", "SCENE"]),
+                                 (["query", mesh, "--pairs", "--with", gltf, "--json", buffer], ["--json", "--with"]),
+                                 (["build", gltf, "-o", buffer], ["--output", "SCENE"]),
+                                 (["build", mesh, "-o", mesh], ["--output", "SCENE"]),
+                                 (["query", mesh, "--knn", "1", "--queries", queries, "--out", out], ["--out", "--queries"]),
+                                 (["query", mesh, "--knn", "1", "--out", out, "--json", out + ".indices.npy"], ["--json", "--out"]),
+                                 (["trace", mesh, *trace, "--mode", "all", "--hits", out + ".npy", "--save-rays", out + ".offsets.npy"],
+                                  ["--hits", "--save-rays"]),
+                                 (["check", "--same", mesh, gltf, "--json", mesh], ["--json", "--same"])):
+            with self.subTest(arguments[0], names=names):
+                self.fail_with_usage(*arguments, names=names)
+        self.assertEqual(before, {file.name: file.read_bytes() for file in (self.folder / "implied").iterdir()})
+        self.succeed("trace", mesh, *trace, "--hits", out + ".npy", "--save-rays", out + ".offsets.npy")  # no --mode all
+        self.succeed("trace", gltf, *trace, "--json", out + ".json")
 
     def test_quiet_prints_nothing(self):
         file = self.write("quiet.ply", TRIANGLE)
