@@ -146,6 +146,7 @@ void run_build(const BuildCommand& options) {
         return build(scene.mesh(), how, options.repeat);
     });
     const TreeStats stats = tree_stats(timed.bvh, stats_options(options.tree, options.common));
+    document["scene"]["left_out"] = timed.bvh.left_out();
     Json build = build_json(timed.bvh, stats, timed.fresh);
     build["device"] = options.tree.device;
     if (is_device(options.tree.device)) {

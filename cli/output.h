@@ -20,6 +20,9 @@ using Json = nlohmann::ordered_json;
 /// {command, version, machine}: the start of every document.
 [[nodiscard]] Json new_document(const std::string& command);
 [[nodiscard]] Json scene_json(const Model& scene);
+/// Puts `left_out` into the scene of a document: its triangles, or points, that are not finite or
+/// out of range. Tables have a line where there are some.
+void tell_left_out(Json& document, std::uint64_t left_out, const CommonOptions& common);
 [[nodiscard]] Json mesh_info_json(const MeshInfo& info);
 
 /// Median, least and greatest of some repeats. At least one value.

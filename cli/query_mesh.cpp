@@ -148,6 +148,7 @@ void run_mesh_query(const QueryCommand& options) {
                                          : answer_pairs(options, tree);
     });
     document["query"] = Json::array({query_json(figures)});
+    tell_left_out(document, tree.bvh.left_out(), options.common);
     if (options.common.prints_tables()) print_query(document["query"][0]);
     write_json(document, options.common);
 }

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <raydix/error.h>
 #include <raydix/picture.h>
+#include <raydix/scene_info.h>
 
 #include <chrono>
 #include <memory>
@@ -83,6 +84,8 @@ void run_render(RenderCommand options) {
                    options.view, ms);
     Json document = new_document("render");
     document["scene"] = about_scene.is_null() ? scene_json(input.scene) : about_scene;
+    tell_left_out(document, scene ? left_out_triangles(*scene) : input.bvh.left_out(),
+                  options.common);
     document["load_ms"] = input.scene.load_ms;
     document["render"] = {{"file", options.out_file}, {"view", options.view},
                           {"width", size.width},      {"height", size.height},

@@ -71,6 +71,7 @@ void run_simulate(const SimulateCommand& options) {
         else
             launches.emplace(options.launches, input, options.common);
         if (options.common.prints_tables()) print_head(options, machine, tree);
+        tell_left_out(document, input.bvh.left_out(), options.common);
         const auto hand_out = [&](const std::vector<SimulationRow>& rows) {
             for (const SimulationRow& row : rows)
                 document["simulate"].push_back(simulation_json(row));

@@ -3,6 +3,7 @@
 #include <raydix/error.h>
 #include <raydix/rays.h>
 #include <raydix/result_limit.h>
+#include <raydix/scene_info.h>
 #include <raydix/trace.h>
 
 #include <chrono>
@@ -470,6 +471,8 @@ void run_trace(const TraceCommand& given) {
     save_kept(options, mode, kept, scene ? scene->hit_fields() : HitFields::tree);
     Json document = new_document("trace");
     document["scene"] = scene ? scene->scene_json() : scene_json(input.scene);
+    tell_left_out(document, scene ? left_out_triangles(scene->scene()) : input.bvh.left_out(),
+                  options.common);
     document["load_ms"] = input.scene.load_ms;
     const std::vector<BuildMs> builds =
         is_rdx(options.scene) ? std::vector<BuildMs>{} : std::vector{input.bvh.build_ms()};

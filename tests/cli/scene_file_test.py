@@ -49,7 +49,7 @@ class SceneFile(ProgramTest):
     def test_counts(self):
         self.succeed("build", self.scene, "--repeat", "1", "-o", "saved.rdx")
         scene = self.document("info", "saved.rdx")["scene"]
-        self.assertEqual((scene["geometries"], scene["instances"], scene["triangles"], scene["vertices"]), (3, 3, 6, 12))
+        self.assertEqual((scene["geometries"], scene["instances"], scene["triangles"], scene["vertices"]), (3, 3, 8, 16))
         self.assertEqual((scene["layout"], scene["quality"]), ("wide8", "balanced"))
         self.assertEqual(scene["bytes"], (self.folder / "saved.rdx").stat().st_size)
         self.assertIn("3 meshes", self.succeed("info", "saved.rdx").out)
