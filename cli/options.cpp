@@ -338,11 +338,13 @@ CLI::Validator finite_number(bool zero_too) {
         double value = 0;
         const char* end = text.data() + text.size();
         const auto [rest, error] = std::from_chars(text.data(), end, value);
-        const bool good = error == std::errc() && rest == end && std::isfinite(value) &&
-                          (zero_too ? value >= 0 : value > 0);
-        return good ? std::string()
-                    : "'" + text + "' is not a " +
-                          (zero_too ? "number from 0 on" : "number above 0");
+        const auto is_good = [&](auto number) {
+            return std::isfinite(number) && (zero_too ? number >= 0 : number > 0);
+        };
+        const bool is_number = error == std::errc() && rest == end && is_good(value);
+        if (is_number && is_good(static_cast<float>(value))) return std::string();
+        return "'" + text + "' is not a " + (zero_too ? "number from 0 on" : "number above 0") +
+               (is_number ? " that float32 holds" : "");
     };
     return {fault, zero_too ? "NONNEGATIVE" : "POSITIVE"};
 }

@@ -96,7 +96,7 @@ void refuse_device(const TreeOptions& tree);
 [[nodiscard]] SceneTree tree_of(Model scene, const std::string& name, const TreeOptions& tree,
                                 const CommonOptions& common);
 
-/// For add_option(...)->check: a finite number above 0, or from 0 on.
+/// For add_option(...)->check: a finite number above 0, or from 0 on, that is one as a float, too.
 [[nodiscard]] CLI::Validator finite_number(bool zero_too);
 
 /// --max-result-bytes.

@@ -97,6 +97,13 @@ class Usage(ProgramTest):
             with self.subTest(option=option):
                 self.fail_with_usage(*arguments, option, "", names=[option, "the name of the file is empty"])
 
+    def test_numbers_that_float32_does_not_hold(self):
+        for command in (("trace", SMALL), ("render", SMALL, "-o", "x.png"), ("simulate", SMALL)):
+            for bad in ("1e-300", "1e300"):
+                self.fail_with_usage(*command, "--ao-radius", bad, names=["--ao-radius", f"'{bad}'", "float32"])
+        self.fail_with_usage("query", SMALL, "--radius", "1e39", names=["--radius", "float32"])
+        self.succeed("query", SMALL, "--radius", "1e-300", "--repeat", "0")  # it may be 0
+
     def test_whole_numbers(self):
         for command, option, most in (("build", "--seed", 2**64 - 1), ("trace", "--max-result-bytes", 2**64 - 1),
                                       ("build", "--repeat", 10000), ("build", "--threads", 1024), ("build", "--max-leaf", 255)):
