@@ -183,6 +183,7 @@ void run_trace(const TraceCommand& options) {
         if (options.common.prints_tables()) {
             print_holding(document["holding"], "triangles");
             fmt::print("rays         {}, {} hits\n", sums[0], sums[1]);
+            print_invalid_rays(sums[2]);
             print_report(document["report"]);
         }
         write_json(document, options.common);

@@ -150,6 +150,10 @@ void print_stages(const Json& build, std::size_t builds) {
                    build["ms_spread"]["max"][stage].get<double>());
 }
 
+void print_invalid_rays(std::uint64_t invalid) {
+    if (invalid != 0) fmt::print("{} rays are invalid and count as misses\n", grouped(invalid));
+}
+
 StatsOptions stats_options(const TreeOptions& tree, const CommonOptions& common) {
     StatsOptions options;
     options.sah = tree.sah;

@@ -48,6 +48,8 @@ inline constexpr std::array<std::pair<const char*, double BuildMs::*>, 7> build_
      {"layout", &BuildMs::layout},
      {"total", &BuildMs::total}}};
 void print_stages(const Json& build, std::size_t builds);
+/// A line if there are some.
+void print_invalid_rays(std::uint64_t invalid);
 [[nodiscard]] StatsOptions stats_options(const TreeOptions& tree, const CommonOptions& common);
 void print_tree_table(const Bvh& bvh, const TreeStats& stats);
 

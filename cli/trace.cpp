@@ -316,8 +316,7 @@ void print_trace(const Json& trace) {
                grouped(trace["hits"].get<std::uint64_t>()), rate["median"].get<double>(),
                rate["min"].get<double>(), rate["max"].get<double>(),
                per_ray("node_visits_per_ray", 1), per_ray("triangle_tests_per_ray", 2));
-    if (const auto invalid = trace["invalid_rays"].get<std::uint64_t>())
-        fmt::print("{} rays are invalid and count as misses\n", grouped(invalid));
+    print_invalid_rays(trace["invalid_rays"].get<std::uint64_t>());
 }
 
 Mode mode_of(const TraceCommand& options) {

@@ -90,6 +90,23 @@ class Answers(Mpi):
                 self.assertGreater(document["report"]["rounds"], 0)
                 self.assertGreater(document["report"]["messages"]["sum"], 0)
 
+    def test_what_is_invalid_is_counted_over_all_ranks(self):
+        queries, rays = self.folder / "invalid_queries.npy", self.folder / "invalid_rays.npy"
+        nan, down = float("nan"), (0, 0, 0, -1, 9)  # tmin, direction, tmax
+        for file, rows in ((queries, [(0, 0, 0), (nan, 0, 0), (1, nan, 0), (1, 1, 1), (nan, nan, nan)]),
+                           (rays, [(0.5, 0.5, 5, *down), (nan, 0, 5, *down), (0.5, 0.4, 5, *down)])):
+            head = f"{{'descr': '<f4', 'fortran_order': False, 'shape': ({len(rows)}, {len(rows[0])}), }}".ljust(117) + "\n"
+            file.write_bytes(b"\x93NUMPY\x01\x00" + struct.pack("<H", len(head)) + head.encode()
+                             + b"".join(struct.pack(f"<{len(row)}f", *row) for row in rows))
+        for kind in (("--knn", "2"), ("--radius", "0.1"), ("--closest",), ("--contains",)):
+            arguments = ("query", self.scene(), "--queries", str(queries), *kind)
+            document = self.document_of(2, *arguments)
+            self.assertEqual((document["queries"], document["invalid_queries"]), (5, 3), kind)
+            self.assertIn(" found, 3 invalid\n", self.run_on(2, *arguments).stdout)
+        arguments = ("trace", self.scene(), "--rays", str(rays))
+        self.assertEqual(self.document_of(2, *arguments)["invalid_rays"], 1)
+        self.assertIn("\n1 rays are invalid and count as misses\n", self.run_on(2, *arguments).stdout)
+
     def test_says_who_reads_and_who_holds_what(self):
         done = self.run_on(3, "info", self.scene())
         self.assertEqual(done.returncode, 0, done.stderr)
