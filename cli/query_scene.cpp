@@ -171,7 +171,10 @@ void run_scene_query(const QueryCommand& options, const QueriedScene& queried,
     });
     document["query"] = Json::array({query_json(figures)});
     tell_left_out(document, left_out_triangles(queried.scene), options.common);
-    if (options.common.prints_tables()) print_query(document["query"][0]);
+    if (options.common.prints_tables()) {
+        if (options.signed_distance) print_solid(document["solid"]);
+        print_query(document["query"][0]);
+    }
     write_json(document, options.common);
 }
 
