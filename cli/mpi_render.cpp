@@ -13,6 +13,7 @@
 #include "mpi_commands.h"
 #include "mpi_input.h"
 #include "mpi_ranks.h"
+#include "option_checks.h"
 #include "picture_options.h"
 #include "scene_file.h"
 
@@ -186,7 +187,7 @@ void add_mpi_render(CLI::App& app) {
     command->add_flag("--distributed", options->is_distributed,
                       "Spread the scene over the ranks. Without it each rank reads and holds all");
     command->callback([options, command] {
-        on_first([&] { check_picture_options(options->picture); });
+        on_first([&] { require_picture(options->picture.out_file); });
         require_writable_results(*command, options->common, "", "");
         run_render(*options);
     });

@@ -214,7 +214,7 @@ void add_mpi_trace(CLI::App& app) {
     command->add_option("--camera", options->camera, "Camera of the rays")
         ->transform(whole_number(0))
         ->capture_default_str();
-    command->add_option("--size", options->size_text, "Pixels, WxH")->capture_default_str();
+    add_size_option(*command, options->size_text, "Pixels")->capture_default_str();
     command->add_option("--mode", options->mode, "Which hits")
         ->check(CLI::IsMember({"closest", "any", "all"}))
         ->capture_default_str();
@@ -222,7 +222,6 @@ void add_mpi_trace(CLI::App& app) {
         "--out", options->prefix,
         "Rank 0 writes PREFIX.prims.npy (64 bits), .t.npy, .uv.npy; or .occluded.npy");
     command->callback([options, command] {
-        static_cast<void>(parse_size(options->size_text));
         if (options->mode == "all")
             refuse_given(*command, {"--out"}, "writes one hit a ray; not with --mode all");
         require_writable_results(*command, options->common, options->prefix,

@@ -349,7 +349,9 @@ CLI::Validator finite_number(bool zero_too) {
     return {fault, zero_too ? "NONNEGATIVE" : "POSITIVE"};
 }
 
-Size parse_size(const std::string& text) {
+namespace {
+
+std::optional<Size> size_of(const std::string& text) {
     Size size;
     const char* end = text.data() + text.size();
     const auto [x, width_error] = std::from_chars(text.data(), end, size.width);
@@ -359,8 +361,35 @@ Size parse_size(const std::string& text) {
         if (height_error == std::errc() && rest == end && fits(size.width) && fits(size.height))
             return size;
     }
-    throw CLI::ValidationError("--size",
-                               "'" + text + "' is not WIDTHxHEIGHT with 1 to 16384 pixels each");
+    return {};
+}
+
+std::string size_fault(const std::string& text) {
+    return size_of(text) ? std::string()
+                         : "'" + text + "' is not WIDTHxHEIGHT with 1 to 16384 pixels each";
+}
+
+}  // namespace
+
+Size parse_size(const std::string& text) {
+    const std::optional<Size> size = size_of(text);
+    if (!size) throw CLI::ValidationError("--size", size_fault(text));
+    return *size;
+}
+
+CLI::Option* add_size_option(CLI::App& command, std::string& size, const std::string& what) {
+    return command.add_option("--size", size, what)->check(size_fault)->type_name("WxH");
+}
+
+void add_cameras_option(CLI::App& command, std::string& camera) {
+    command.add_option("--camera", camera, "Number of a camera, or all")
+        ->check([](const std::string& text) {
+            const bool is_known =
+                text == "all" ||
+                (!text.empty() && text.find_first_not_of("0123456789") == std::string::npos);
+            return is_known ? std::string() : "'" + text + "' is neither a number nor 'all'";
+        })
+        ->capture_default_str();
 }
 
 }  // namespace raydix::cli

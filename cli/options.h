@@ -122,6 +122,10 @@ struct Size {
     std::uint32_t width = 0, height = 0;
 };
 [[nodiscard]] Size parse_size(const std::string& text);
+/// --size, of which the command takes the text. `what` it is of.
+CLI::Option* add_size_option(CLI::App& command, std::string& size, const std::string& what);
+/// --camera: a number, or all.
+void add_cameras_option(CLI::App& command, std::string& camera);
 
 void add_info_command(CLI::App& app);
 void add_scenes_command(CLI::App& app);

@@ -39,11 +39,6 @@ RenderOptions PictureOptions::render_options(const CameraSet& cameras,
     return chosen;
 }
 
-void check_picture_options(const PictureOptions& options) {
-    if (!options.size_text.empty()) static_cast<void>(parse_size(options.size_text));
-    require_picture(options.out_file);
-}
-
 void add_picture_options(CLI::App& command, PictureOptions& options,
                          const std::vector<std::string>& views) {
     command
@@ -55,9 +50,7 @@ void add_picture_options(CLI::App& command, PictureOptions& options,
     command.add_option("--view", options.view, "What to show")
         ->check(CLI::IsMember(views))
         ->capture_default_str();
-    command
-        .add_option("--size", options.size_text, "Pixels (default: of cameras.json, or 1024x768)")
-        ->type_name("WxH");
+    add_size_option(command, options.size_text, "Pixels (default: of cameras.json, or 1024x768)");
     command.add_option("--camera", options.camera, "Number of a camera")
         ->transform(whole_number(0))
         ->capture_default_str();

@@ -27,8 +27,6 @@ struct PictureOptions {
     [[nodiscard]] RenderOptions render_options(const CameraSet& cameras,
                                                const CommonOptions& common) const;
 };
-/// Before any work: --size must be one, and the picture must have a name that can be written.
-void check_picture_options(const PictureOptions& options);
 void add_picture_options(CLI::App& command, PictureOptions& options,
                          const std::vector<std::string>& views);
 

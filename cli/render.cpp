@@ -8,6 +8,7 @@
 #include <memory>
 #include <utility>
 
+#include "option_checks.h"
 #include "output.h"
 #include "picture_options.h"
 #include "scene_file.h"
@@ -109,7 +110,7 @@ void add_render_command(CLI::App& app) {
     add_flatten_option(*command, options->common);
     add_common_options(*command, options->common);
     command->callback([options] {
-        check_picture_options(*options);
+        require_picture(options->out_file);
         require_writable_json(options->common);
         run_render(*options);
     });

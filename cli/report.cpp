@@ -138,8 +138,7 @@ void add_report_command(CLI::App& app) {
         ->add_option("--scenes", options->scene_folder,
                      "Where scene files that the documents name lie (default: here)")
         ->type_name("FOLDER");
-    command->add_option("--size", options->size_text, "Pixels of rendered pictures")
-        ->type_name("WxH")
+    add_size_option(*command, options->size_text, "Pixels of rendered pictures")
         ->capture_default_str();
     command->add_option("--threads", options->common.threads, "Threads to use (0: all)")
         ->transform(whole_number(0, 1024));

@@ -533,12 +533,9 @@ void add_trace_command(CLI::App& app) {
         ->check(CLI::IsMember(trace_kernel_names()));
     command->add_option("--machine", options->machine, "Simulated machine of --device sim")
         ->capture_default_str();
-    command->add_option("--camera", options->camera, "Number of a camera, or all")
-        ->capture_default_str();
-    command
-        ->add_option("--size", options->size_text,
-                     "Pixels of the cameras (default: of cameras.json, or 1024x768)")
-        ->type_name("WxH");
+    add_cameras_option(*command, options->camera);
+    add_size_option(*command, options->size_text,
+                    "Pixels of the cameras (default: of cameras.json, or 1024x768)");
     command->add_option("--samples", options->samples, "Secondary rays per primary hit")
         ->transform(whole_number(1, 1024))
         ->capture_default_str();

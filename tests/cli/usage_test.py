@@ -97,6 +97,13 @@ class Usage(ProgramTest):
             with self.subTest(option=option):
                 self.fail_with_usage(*arguments, option, "", names=[option, "the name of the file is empty"])
 
+    def test_sizes_and_cameras_are_looked_at_before_the_work(self):
+        for command in (("trace", "absent.ply"), ("simulate", "absent.ply"), ("render", "absent.ply", "-o", "x.png"),
+                        ("report", "absent.json", "-o", "x.html"), ("bench", "traversal", "absent.ply")):
+            self.fail_with_usage(*command, "--size", "foo", names=["--size", "'foo'"])
+            if command[0] != "report":
+                self.fail_with_usage(*command, "--camera", "foo", names=["--camera", "'foo'"])
+
     def test_numbers_that_float32_does_not_hold(self):
         for command in (("trace", SMALL), ("render", SMALL, "-o", "x.png"), ("simulate", SMALL)):
             for bad in ("1e-300", "1e300"):
