@@ -58,7 +58,8 @@ void require_writable_json(const CommonOptions& common);
 /// Writes the document if one was asked for. Throws InputError that names the file.
 void write_json(const Json& document, const CommonOptions& common);
 
-/// A bar on standard error after the first second, on a terminal only.
+/// A bar on standard error after the first second, on a terminal only. It is wiped when it ends,
+/// which is to be before results are printed.
 class Progress {
 public:
     Progress(std::string what, const CommonOptions& common);

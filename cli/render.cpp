@@ -66,10 +66,10 @@ void run_render(RenderCommand options) {
     RenderOptions render_options = options.render_options(cameras, options.common);
     render_options.view = of_tree ? View::shaded : view_from_name(options.view);
     const Size size{render_options.width, render_options.height};
-    Progress progress("rendering", options.common);
-    render_options.progress = [&](double part) { progress.show(part); };
     const auto start = std::chrono::steady_clock::now();
     const Picture picture = about(options.scene, [&] {
+        Progress progress("rendering", options.common);
+        render_options.progress = [&](double part) { progress.show(part); };
         if (options.view == "slice") return draw_slice(tree_scene, options.tree_view, size);
         if (of_tree) return render_tree(input.bvh, camera, tree_scene.boxes, render_options);
         return scene ? render(*scene, camera, render_options)

@@ -449,7 +449,6 @@ void run_trace(const TraceCommand& given) {
     if (scene && options.explain) scene->explain(options.common);
     if (warps) explain_warps(options, input.bvh);
     if (through_kdtree && options.explain) explain_kdtree(*traced.kdtree, options.common);
-    Progress progress("tracing", options.common);
     if (options.rays.ends_with(".npy")) {
         const std::vector<Ray> rays = load_rays(options.rays);
         if (!rays.empty())
@@ -458,6 +457,7 @@ void run_trace(const TraceCommand& given) {
     } else {
         const std::vector<Camera> cameras =
             about(options.scene, [&] { return chosen_cameras(options.camera, input.scene); });
+        Progress progress("tracing", options.common);
         for (std::size_t c = 0; c < cameras.size(); ++c)
             about(options.scene, [&] {
                 trace_camera(options, input, cameras[c], ray_kind(options.rays), size, batch, tally,

@@ -368,13 +368,15 @@ class Usage(ProgramTest):
                 break
             samples *= 2
         shown = self.on_terminal(*command, "--samples", str(samples))
+        both = self.on_terminal(*command, "--samples", str(samples), with_tables=True)
+        self.assertRegex(both, rb" %\r\x1b\[Kp\.png \(1600 x 1200", "the bar is not wiped before the result")
         self.assertRegex(shown, rb"\rrendering \[#*\.*\] +\d+ %")
         self.assertTrue(shown.rstrip().endswith(b"\r\x1b[K"), "the bar is not wiped at the end")
         self.assertEqual(self.on_terminal(*command, "--samples", str(samples), "--quiet"), b"")
 
-    def on_terminal(self, *arguments):
+    def on_terminal(self, *arguments, with_tables=False):
         ours, theirs = pty.openpty()
-        process = subprocess.Popen([PROGRAM, *arguments], stdout=subprocess.DEVNULL, stderr=theirs, cwd=self.folder)
+        process = subprocess.Popen([PROGRAM, *arguments], stdout=theirs if with_tables else subprocess.DEVNULL, stderr=theirs, cwd=self.folder)
         os.close(theirs)
         shown = b""
         try:
