@@ -66,6 +66,7 @@ struct Rendered {
     Picture picture;  // of rank 0
     Json holding;     // of a distributed scene
     Scene alone;      // of rank 0, if --verify asks for it
+    Aabb bounds;      // of the whole, on rank 0
     double ms = 0;
 };
 
@@ -106,6 +107,7 @@ Model load_shown(const MpiRenderCommand& command, Scene& scene) {
 Rendered render_replicated(const MpiRenderCommand& command) {
     Rendered rendered;
     on_each([&] { rendered.shot = shot_of(command, load_shown(command, rendered.alone)); });
+    rendered.bounds = rendered.alone.bounds();
     Progress progress("rendering", command.common);
     show_progress(rendered.shot, progress);
     timed(rendered, [&] {
@@ -130,6 +132,7 @@ Rendered render_distributed(const MpiRenderCommand& command) {
         rendered.picture = mpi::render(scene, rendered.shot.camera, rendered.shot.options);
     });
     on_first([&] {
+        rendered.bounds = inspect(model.whole.mesh()).bounds;
         if (command.verify) rendered.alone = Scene(model.whole.mesh());
     });
     return rendered;
@@ -163,12 +166,9 @@ void run_render(const MpiRenderCommand& command) {
             document["holding"] = rendered.holding;
         else
             document.erase("partition");
-        document["render"] = {{"file", command.picture.out_file},
-                              {"view", command.picture.view},
-                              {"width", options.width},
-                              {"height", options.height},
-                              {"scene", held},
-                              {"ms", rendered.ms}};
+        document["render"] =
+            picture_json(command.picture, rendered.shot.camera, options, rendered.bounds);
+        document["render"].update({{"scene", held}, {"ms", rendered.ms}});
         document["verified"] = command.verify;
         write_json(document, command.common);
     });

@@ -3,6 +3,7 @@
 #include <raydix/error.h>
 
 #include "option_checks.h"
+#include "ray_launches.h"
 
 namespace raydix::cli {
 namespace {
@@ -37,6 +38,24 @@ RenderOptions PictureOptions::render_options(const CameraSet& cameras,
     chosen.seed = common.seed;
     chosen.threads = common.threads;
     return chosen;
+}
+
+Json picture_json(const PictureOptions& options, const Camera& camera, const RenderOptions& chosen,
+                  const Aabb& bounds) {
+    const auto xyz = [](Vec3 v) { return Json::array({v.x, v.y, v.z}); };
+    const bool is_ao = chosen.view == View::ao;
+    return {{"file", options.out_file},
+            {"view", options.view},
+            {"width", chosen.width},
+            {"height", chosen.height},
+            {"camera", options.moves_camera() ? Json(nullptr) : Json(camera.name)},
+            {"eye", xyz(camera.position)},
+            {"target", xyz(camera.target)},
+            {"up", xyz(camera.up)},
+            {"fov", camera.vfov},
+            {"samples", light_samples(chosen)},
+            {"ao_radius",
+             is_ao ? Json(chosen_ao_radius(chosen.ao_radius, {}, bounds)) : Json(nullptr)}};
 }
 
 void add_picture_options(CLI::App& command, PictureOptions& options,

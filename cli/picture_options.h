@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "options.h"
+#include "output.h"
 
 namespace raydix::cli {
 
@@ -23,10 +23,17 @@ struct PictureOptions {
     /// InputError: there is no such camera, or cameras.json is at fault and --eye does not replace
     /// it.
     [[nodiscard]] Camera chosen_camera(const Model& scene) const;
+    /// Whether chosen_camera() moved it.
+    [[nodiscard]] bool moves_camera() const {
+        return !eye.empty() || !target.empty() || !up.empty() || fov;
+    }
     /// All but the view.
     [[nodiscard]] RenderOptions render_options(const CameraSet& cameras,
                                                const CommonOptions& common) const;
 };
+/// The start of the `render` object of a document. `bounds`: of the scene.
+[[nodiscard]] Json picture_json(const PictureOptions& options, const Camera& camera,
+                                const RenderOptions& chosen, const Aabb& bounds);
 void add_picture_options(CLI::App& command, PictureOptions& options,
                          const std::vector<std::string>& views);
 

@@ -88,9 +88,13 @@ void run_render(RenderCommand options) {
     tell_left_out(document, scene ? left_out_triangles(*scene) : input.bvh.left_out(),
                   options.common);
     document["load_ms"] = input.scene.load_ms;
-    document["render"] = {{"file", options.out_file}, {"view", options.view},
-                          {"width", size.width},      {"height", size.height},
-                          {"camera", camera.name},    {"ms", ms}};
+    document["render"] =
+        picture_json(options, camera, render_options, scene ? scene->bounds() : input.bvh.bounds());
+    if (of_tree) document["render"]["samples"] = 0;
+    if (options.view == "slice")
+        for (const char* field : {"camera", "eye", "target", "up", "fov"})
+            document["render"][field] = nullptr;
+    document["render"]["ms"] = ms;
     write_json(document, options.common);
 }
 
