@@ -100,7 +100,7 @@ public:
     explicit QueryRun(const MpiQueryCommand& options)
         : options_(options),
           model_(spread_model(options)),
-          document_(mpi_document("mpi query", options)) {
+          document_(mpi_document("mpi query", options, model_)) {
         if (options.closest) require_triangles(model_, options, "closest points");
         if (options.contains) require_triangles(model_, options, "solids");
         if (options.verify || options.queries_file.empty() || asks_vertices())
@@ -112,6 +112,7 @@ public:
     void run() {
         options_.closest || options_.contains ? ask_scene() : ask_points();
         on_first([&] {
+            tell_left_out(document_, document_["holding"]["left_out"], options_.common);
             if (options_.common.prints_tables()) {
                 fmt::print("queries      {}, {} found, {} invalid\n",
                            document_["queries"].get<std::uint64_t>(),

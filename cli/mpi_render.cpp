@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <raydix/picture.h>
 #include <raydix/rdx.h>
+#include <raydix/scene_info.h>
 
 #include <chrono>
 #include <cstring>
@@ -64,9 +65,12 @@ Shot shot_of_first(const MpiRenderCommand& command, const Model& model) {
 struct Rendered {
     Shot shot;
     Picture picture;  // of rank 0
-    Json holding;     // of a distributed scene
-    Scene alone;      // of rank 0, if --verify asks for it
-    Aabb bounds;      // of the whole, on rank 0
+    Json scene;       // of the document
+    double load_ms = 0;
+    Json holding;  // of a distributed scene
+    std::uint64_t left_out = 0;
+    Scene alone;  // of rank 0, if --verify asks for it
+    Aabb bounds;  // of the whole, on rank 0
     double ms = 0;
 };
 
@@ -83,11 +87,12 @@ void show_progress(Shot& shot, Progress& progress) {
 }
 
 /// What raydix render shows of one file, or the mesh of several; gives its cameras.
-Model load_shown(const MpiRenderCommand& command, Scene& scene) {
+Model load_shown(const MpiRenderCommand& command, Rendered& rendered) {
     const bool is_one = command.more.empty();
     if (is_one && is_scene_file(command.scene)) {
         RdxScene file = load_rdx_scene(command.scene);
-        scene = std::move(file.scene);
+        rendered.alone = std::move(file.scene);
+        rendered.scene = scene_file_json(file);
         return model_of(file);
     }
     const bool is_tree = is_one && is_rdx(command.scene);
@@ -99,14 +104,20 @@ Model load_shown(const MpiRenderCommand& command, Scene& scene) {
                            : load_files(command);
     SceneOptions options;
     options.threads = command.common.threads;
-    about(command.names(), [&] { scene = Scene(model, options); });
+    about(command.names(), [&] { rendered.alone = Scene(model, options); });
+    rendered.scene = scene_json(model);
     return model;
 }
 
 /// Each rank reads the scene itself.
 Rendered render_replicated(const MpiRenderCommand& command) {
     Rendered rendered;
-    on_each([&] { rendered.shot = shot_of(command, load_shown(command, rendered.alone)); });
+    on_each([&] {
+        const Model model = load_shown(command, rendered);
+        rendered.load_ms = model.load_ms;
+        rendered.left_out = left_out_triangles(rendered.alone);
+        rendered.shot = shot_of(command, model);
+    });
     rendered.bounds = rendered.alone.bounds();
     Progress progress("rendering", command.common);
     show_progress(rendered.shot, progress);
@@ -125,7 +136,10 @@ Rendered render_distributed(const MpiRenderCommand& command) {
     rendered.shot = shot_of_first(command, model.whole);
     const MeshView view(model.part);
     const mpi::DistributedScene scene(MPI_COMM_WORLD, std::span(&view, 1), command.scene_options());
+    rendered.scene = model.json(command);
+    rendered.load_ms = model.load_ms;
     rendered.holding = holding_json(scene.holding());
+    rendered.left_out = scene.holding().left_out;
     Progress progress("rendering", command.common);
     show_progress(rendered.shot, progress);
     timed(rendered, [&] {
@@ -146,7 +160,7 @@ bool same_picture(const Picture& a, const Picture& b) {
 void run_render(const MpiRenderCommand& command) {
     Rendered rendered =
         command.is_distributed ? render_distributed(command) : render_replicated(command);
-    Json document = mpi_document("mpi render", command);
+    Json document = mpi_document("mpi render", command, rendered.scene, rendered.load_ms);
     on_first([&] {
         const RenderOptions& options = rendered.shot.options;
         if (command.verify) {
@@ -162,6 +176,7 @@ void run_render(const MpiRenderCommand& command) {
             fmt::print("{} ({} x {}, {}, {} ranks, scene {}, {:.0f} ms)\n",
                        command.picture.out_file, options.width, options.height,
                        command.picture.view, mpi_ranks(), held, rendered.ms);
+        tell_left_out(document, rendered.left_out, command.common);
         if (command.is_distributed)
             document["holding"] = rendered.holding;
         else

@@ -46,7 +46,7 @@ void add_tree_hash(SpreadModel& model, const InfoCommand& options, Json& documen
 
 void run_info(const InfoCommand& options) {
     SpreadModel model = spread_model(options);
-    Json document = mpi_document("mpi info", options);
+    Json document = mpi_document("mpi info", options, model);
     if (model.triangles == 0) {
         const mpi::DistributedPoints points(MPI_COMM_WORLD, model.part.vertices, options.options());
         document["holding"] = holding_json(points.holding());
@@ -59,6 +59,7 @@ void run_info(const InfoCommand& options) {
     on_first([&] {
         if (options.common.prints_tables())
             print_holding(document["holding"], model.triangles == 0 ? "points" : "triangles");
+        tell_left_out(document, document["holding"]["left_out"], options.common);
     });
     if (options.with_hash || options.verify) add_tree_hash(model, options, document);
     document["verified"] = options.verify;
@@ -136,7 +137,7 @@ void run_trace(const TraceCommand& options) {
     const std::vector<Ray> mine = scatter(rays);
     const MeshView view(model.part);
     const mpi::DistributedScene scene(MPI_COMM_WORLD, std::span(&view, 1), options.scene_options());
-    Json document = mpi_document("mpi trace", options);
+    Json document = mpi_document("mpi trace", options, model);
     document["holding"] = holding_json(scene.holding());
     document["mode"] = options.mode;
     TraceCounts counts;
@@ -186,6 +187,7 @@ void run_trace(const TraceCommand& options) {
             print_invalid_rays(sums[2]);
             print_report(document["report"]);
         }
+        tell_left_out(document, document["holding"]["left_out"], options.common);
         write_json(document, options.common);
     });
 }

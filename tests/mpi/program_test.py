@@ -90,6 +90,23 @@ class Answers(Mpi):
                 self.assertGreater(document["report"]["rounds"], 0)
                 self.assertGreater(document["report"]["messages"]["sum"], 0)
 
+    def test_documents_name_the_scene_as_those_of_one_process(self):
+        alone = json.loads(subprocess.run([PROGRAM, "info", self.scene(), "--json", "-"], capture_output=True).stdout)["scene"]
+        far = self.folder / "far.obj"
+        far.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 2e12 0 0\nf 1 2 3\nf 1 2 4\n")
+        size = ("--size", "8x8")
+        for arguments in (("info",), ("trace", *size), ("query", "--closest"), ("render", *size, "-o", str(self.folder / "s.png")),
+                          ("render", *size, "-o", str(self.folder / "s.png"), "--distributed")):
+            with self.subTest(arguments):
+                document = self.document_of(2, arguments[0], self.scene(), *arguments[1:])
+                for field in ("name", "triangles", "points", "vertices", "left_out"):
+                    self.assertEqual(document["scene"][field], alone[field], field)
+                self.assertGreater(document["load_ms"], 0)
+                self.assertEqual(self.document_of(2, arguments[0], str(far), *arguments[1:])["scene"]["left_out"], 1)
+                self.assertIn("1 triangle left out", self.run_on(2, arguments[0], str(far), *arguments[1:]).stdout)
+        document = self.document_of(2, "info", self.scene(), self.scene())
+        self.assertEqual((document["scene"]["name"], document["scene"]["triangles"]), ("solid.obj, solid.obj", 2 * alone["triangles"]))
+
     def test_what_is_invalid_is_counted_over_all_ranks(self):
         queries, rays = self.folder / "invalid_queries.npy", self.folder / "invalid_rays.npy"
         nan, down = float("nan"), (0, 0, 0, -1, 9)  # tmin, direction, tmax
