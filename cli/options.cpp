@@ -207,7 +207,9 @@ void say_flattened(const std::string& scene, const CommonOptions& common) {
         complain(scene + ": its meshes and nodes are taken as one mesh (--flatten)");
 }
 
-bool is_rdx(const std::string& scene) { return CLI::detail::to_lower(scene).ends_with(".rdx"); }
+bool is_rdx(const std::string& scene) {
+    return CLI::detail::to_lower(scene).ends_with(".rdx") || is_rdx_file(scene);
+}
 
 bool is_scene_file(const std::string& scene) { return is_rdx(scene) && holds_scene(scene); }
 

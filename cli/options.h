@@ -58,6 +58,7 @@ struct SceneTree {
     Model scene;
     Bvh bvh;
 };
+/// By its name, or by how it begins.
 [[nodiscard]] bool is_rdx(const std::string& scene);
 /// An .rdx file that holds a scene (scene_file.h).
 [[nodiscard]] bool is_scene_file(const std::string& scene);

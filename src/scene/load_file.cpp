@@ -6,6 +6,7 @@
 #include <cctype>
 #include <new>
 #include <stdexcept>
+#include <string_view>
 #include <utility>
 
 #include "base/float_env.h"
@@ -14,6 +15,8 @@
 
 namespace raydix {
 namespace {
+
+constexpr std::string_view rdx_start = "\x89rdx\r\n\x1a\n";  // docs/rdx-format.md
 
 std::string lower(std::string text) {
     for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
@@ -42,6 +45,9 @@ Model model_of(Mesh mesh) {
 
 Model load_by_extension(ByteSource& in, const std::filesystem::path& file,
                         const std::string& extension) {
+    in.fill(rdx_start.size());
+    if (extension == ".rdx" || in.buffered().starts_with(rdx_start))
+        in.fail("file", "holds a tree or a scene, which load_rdx or load_rdx_scene read");
     if (extension == ".ply") return model_of(load_ply(in));
     if (extension == ".obj") return model_of(load_obj(in));
     if (extension == ".stl") return model_of(load_stl(in));
@@ -49,8 +55,6 @@ Model load_by_extension(ByteSource& in, const std::filesystem::path& file,
     if (extension == ".xyz") return model_of(load_xyz(in));
     if (extension == ".npy") return model_of(load_npy_points(in));
     if (is_gltf(extension)) return load_gltf_file(in, file);
-    if (extension == ".rdx")
-        in.fail("file name", "is that of a tree or a scene, which load_rdx or load_rdx_scene read");
     in.fail(
         "file name",
         "ends in none of .ply .obj .stl .off .xyz .npy .gltf .glb, with or without .gz .xz .zst, "
