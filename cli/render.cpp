@@ -4,6 +4,7 @@
 #include <raydix/picture.h>
 #include <raydix/scene_info.h>
 
+#include <algorithm>
 #include <chrono>
 #include <memory>
 #include <utility>
@@ -25,6 +26,16 @@ struct RenderCommand : PictureOptions {
     TreeViewOptions tree_view;
 };
 
+void require_triangles(const Model& model, const std::string& scene) {
+    const auto has_triangles = [](const Mesh& mesh) { return !mesh.triangles.empty(); };
+    const auto has_vertices = [](const Mesh& mesh) { return !mesh.vertices.empty(); };
+    if (std::ranges::none_of(model.meshes, has_triangles) &&
+        std::ranges::any_of(model.meshes, has_vertices))
+        throw InputError(scene +
+                         ": it holds points, and this view needs triangles; --view tree and --view "
+                         "slice show the tree of points");
+}
+
 /// Without a binary tree, unless the options ask for one.
 SceneTree load_shown(const RenderCommand& options, std::optional<Scene>& scene, Json& about_it) {
     if (is_scene_file(options.scene)) {
@@ -34,9 +45,13 @@ SceneTree load_shown(const RenderCommand& options, std::optional<Scene>& scene, 
         scene.emplace(std::move(file.scene));
         return {std::move(model), {}};
     }
-    if (is_rdx(options.scene) || !serves_a_scene(options.tree, options.common))
-        return load_scene_tree(options.scene, options.tree, options.common);
+    if (is_rdx(options.scene) || !serves_a_scene(options.tree, options.common)) {
+        SceneTree tree = load_scene_tree(options.scene, options.tree, options.common);
+        require_triangles(tree.scene, options.scene);
+        return tree;
+    }
     Model model = load_structured_model(options.scene, options.tree, options.common);
+    require_triangles(model, options.scene);
     about(options.scene,
           [&] { scene.emplace(model, scene_options(options.tree, options.common)); });
     return {std::move(model), {}};

@@ -271,7 +271,10 @@ class Usage(ProgramTest):
         points = self.write("points.ply", ply([(0, 0, 0), (1, 0, 0)]))
         self.fail_with_one_line("trace", points, names=["points.ply", "points"])
         self.fail_with_one_line("build", points, "--layout", "compact", "--quiet", names=["points.ply", "rays need triangles"])
-        self.fail_with_one_line("render", points, "-o", "x.png", names=["points.ply", "points"])
+        for options in ((), ("--builder", "ploc")):
+            self.fail_with_one_line("render", points, "-o", "x.png", *options, names=["points.ply", "points", "--view tree", "--view slice"])
+        for view in ("tree", "slice"):
+            self.succeed("render", points, "-o", "x.png", "--size", "8x8", "--view", view)
 
     def test_odd_file_names(self):
         for name in (b"caf\xe9.ply", "gr\u00fcn \u6728.ply".encode(), b"two\nlines.ply", b"-dash.ply", b"\x1b[31m.ply"):
