@@ -22,7 +22,7 @@ namespace raydix::cli {
 
 /// Figures that both kinds have.
 struct TreeFigures {
-    const char *tree, *layout, *element;  // "kdtree", "binary", "primitive"
+    const char *tree, *layout;  // "kdtree", "binary"
     PrimitiveKind kind;
     int bits, max_leaf, threads;
     std::uint64_t input_count, left_out, nodes, leaves, references, layout_nodes, max_depth;

@@ -112,6 +112,13 @@ void run_report(const ReportCommand& options) {
                    grouped((html.size() + 999) / 1000));
 }
 
+void require_page_name(const std::string& file) {
+    const std::string ending =
+        CLI::detail::to_lower(std::filesystem::path(file).extension().string());
+    if (!ending.empty() && ending != ".html" && ending != ".htm")
+        throw CLI::ValidationError("--output", "'" + file + "' is no name of a page: .html");
+}
+
 }  // namespace
 
 void add_report_command(CLI::App& app) {
@@ -147,6 +154,7 @@ void add_report_command(CLI::App& app) {
         ->transform(whole_number(0))
         ->capture_default_str();
     command->callback([options] {
+        require_page_name(options->out_file);
         require_writable(options->out_file);
         run_report(*options);
     });

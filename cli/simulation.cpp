@@ -447,6 +447,19 @@ void check_machine(const std::string& name_or_file, std::span<const SimulateOpti
     name_or_file.ends_with(".json") ? about(name_or_file, check) : check();
 }
 
+namespace {
+
+/// The same work would be done twice.
+void refuse_repeats(const std::string& names, const char* option) {
+    std::vector<std::string> sorted = split(names);
+    std::ranges::sort(sorted);
+    const auto twice = std::ranges::adjacent_find(sorted);
+    if (twice != sorted.end())
+        throw CLI::ValidationError(option, "'" + *twice + "' is given twice");
+}
+
+}  // namespace
+
 std::vector<WarpKernel> kernels_from(const std::string& names) {
     if (names == "all") return {warp_kernel_family().begin(), warp_kernel_family().end()};
     std::vector<WarpKernel> kernels;
@@ -455,6 +468,7 @@ std::vector<WarpKernel> kernels_from(const std::string& names) {
         } catch (const InputError& error) {
             throw CLI::ValidationError("--kernel", error.what());
         }
+    refuse_repeats(names, "--kernel");
     return kernels;
 }
 
@@ -479,6 +493,7 @@ std::vector<RayKind> kinds_from(const std::string& names) {
                 "--rays", "'" + name + "' is not primary, ao, diffuse, diffuse_shuffled or all");
         kinds.push_back(*kind);
     }
+    refuse_repeats(names, "--rays");
     return kinds;
 }
 

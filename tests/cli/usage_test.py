@@ -97,6 +97,19 @@ class Usage(ProgramTest):
             with self.subTest(option=option):
                 self.fail_with_usage(*arguments, option, "", names=[option, "the name of the file is empty"])
 
+    def test_faults_are_named_as_they_were_typed(self):
+        self.fail_with_usage("--nope", names=["'--nope' is not an option of raydix"])
+        self.fail_with_usage("bench", "--nope=3", names=["'--nope' is not an option of bench"])
+        self.fail_with_usage("trace", SMALL, "--siz", "8x8", names=["not expected: --siz 8x8"])
+        for option, names in (("--kernel", "packet,while_while,packet"), ("--rays", "primary,ao,primary")):
+            self.fail_with_usage("simulate", SMALL, option, names, names=[option, names.split(",")[0], "twice"])
+        self.fail_with_usage("man", "--folder", "", names=["--folder", "empty"])
+        self.fail_with_usage("render", SMALL, "-o", "x.png", "--view", "tree", "--levels", "", names=["--levels"])
+        result = self.write("empty.json", "{}")
+        self.fail_with_usage("report", result, "-o", "t.png", names=["--output", "t.png", ".html"])
+        for tree in ("octree", "kdtree"):
+            self.assertIn(" bytes a triangle)", self.succeed("build", SMALL, "--tree", tree, "--repeat", "1").out)
+
     def test_sizes_and_cameras_are_looked_at_before_the_work(self):
         for command in (("trace", "absent.ply"), ("simulate", "absent.ply"), ("render", "absent.ply", "-o", "x.png"),
                         ("report", "absent.json", "-o", "x.html"), ("bench", "traversal", "absent.ply")):
