@@ -19,6 +19,8 @@
 namespace raydix::cli {
 namespace {
 
+constexpr const char* tree_group = "Tree";
+
 /// "" or why --device may not be this.
 std::string device_fault(std::string& device) {
     for (const char* word : {"cpu", "cuda", "sim", "opencl", "hip"})
@@ -65,15 +67,14 @@ void add_flatten_option(CLI::App& command, CommonOptions& options) {
 }
 
 void add_tree_options(CLI::App& command, TreeOptions& options) {
-    const char* group = "Tree";
     const auto of_the_build = [&](CLI::Option* option) {
         options.of_the_build.push_back(option);
-        return option->group(group);
+        return option->group(tree_group);
     };
     command.add_option("--tree", options.tree, "Kind of tree")
         ->check(CLI::IsMember({"bvh", "octree", "kdtree"}))
         ->capture_default_str()
-        ->group(group);
+        ->group(tree_group);
     CLI::Option* builder =
         of_the_build(command.add_option("--builder", options.builder,
                                         "Builder (default: that of --quality; on a GPU karras)"))
@@ -111,27 +112,38 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
                 "which is wide8 with shared vertices; cwbvh: build only (default: binary, of the "
                 "engine wide8)")
             ->check(CLI::IsMember({"binary", "wide4", "wide8", "compact", "cwbvh"}))
-            ->group(group);
+            ->group(tree_group);
     command
         .add_option(
             "--device", options.device,
             "Where to build (cpu, cuda, opencl, opencl:N, hip or hip:N) and trace (these and sim)")
         ->check(CLI::Validator(device_fault, "cpu|cuda|opencl[:N]|hip[:N]|sim"))
         ->capture_default_str()
-        ->group(group);
+        ->group(tree_group);
     of_the_build(
         command.add_option("--fit", options.fit, "Boxes: level by level, or bottom-up in one pass"))
         ->check(CLI::IsMember({"levels", "atomic"}));
     of_the_build(command.add_flag("--strict", options.strict,
                                   "Invalid primitives are an error instead of being left out"));
+    command
+        .add_option("--cameras", options.cameras_file,
+                    "Cameras file instead of cameras.json beside the scene")
+        ->check(file_name())
+        ->type_name("FILE")
+        ->group(tree_group);
+    for (const char* name : {"--builder", "--quality", "--reinsertion-rounds", "--fit"})
+        options.of_a_bvh.push_back(command.get_option(name));
+}
+
+void add_tree_figure_options(CLI::App& command, TreeOptions& options) {
     command.add_option("--sah-node", options.sah.node, "SAH cost of an inner node")
         ->check(finite_number(true))
         ->capture_default_str()
-        ->group(group);
+        ->group(tree_group);
     command.add_option("--sah-primitive", options.sah.primitive, "SAH cost of a primitive")
         ->check(finite_number(true))
         ->capture_default_str()
-        ->group(group);
+        ->group(tree_group);
     command
         .add_option("--epo", options.epo_sample,
                     "Also compute end-point overlap, over this part of the triangles")
@@ -140,15 +152,8 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
         ->check(finite_number(false))
         ->check(CLI::Range(1e-9, 1.0))
         ->type_name("SAMPLE")
-        ->group(group);
-    command
-        .add_option("--cameras", options.cameras_file,
-                    "Cameras file instead of cameras.json beside the scene")
-        ->check(file_name())
-        ->type_name("FILE")
-        ->group(group);
-    for (const char* name : {"--builder", "--quality", "--reinsertion-rounds", "--fit",
-                             "--sah-node", "--sah-primitive", "--epo"})
+        ->group(tree_group);
+    for (const char* name : {"--sah-node", "--sah-primitive", "--epo"})
         options.of_a_bvh.push_back(command.get_option(name));
 }
 

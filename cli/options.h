@@ -52,6 +52,8 @@ struct TreeOptions {
                                              const CommonOptions& common) const;
 };
 void add_tree_options(CLI::App& command, TreeOptions& options);
+/// Of commands that print figures of the tree: SAH and EPO.
+void add_tree_figure_options(CLI::App& command, TreeOptions& options);
 
 /// A scene and its tree: built, or both read from a .rdx file.
 struct SceneTree {

@@ -560,6 +560,7 @@ void add_trace_command(CLI::App& app) {
     add_result_limit(*command, options->max_result_bytes);
     add_wide_trace_options(*command, options->wide);
     add_tree_options(*command, options->tree);
+    add_tree_figure_options(*command, options->tree);
     add_flatten_option(*command, options->common);
     add_common_options(*command, options->common);
     command->callback([options, command] {

@@ -12,15 +12,15 @@ sys.dont_write_bytecode = True
 from program import COMMANDS, PROGRAM, TIME_LIMIT_S, TRIANGLE, ProgramTest, json_of, main, ply, write_npy  # noqa: E402
 
 COMMON = ["--json", "--threads", "--quiet", "--seed"]
-TREE = ["--tree", "--builder", "--quality", "--bits", "--max-leaf", "--max-level", "--fit", "--layout", "--device", "--strict",
-        "--epo", "--cameras", "--sah-node", "--sah-primitive"]
+TREE = ["--tree", "--builder", "--quality", "--bits", "--max-leaf", "--max-level", "--fit", "--layout", "--device", "--strict", "--cameras"]
+FIGURES = ["--epo", "--sah-node", "--sah-primitive"]
 OPTIONS = {
     "info": ["SCENE"],
     "scenes": [],
-    "build": ["SCENE", "--repeat", "--output", *TREE],
+    "build": ["SCENE", "--repeat", "--output", *TREE, *FIGURES],
     "check": ["SCENE", "--same", *TREE],
     "trace": ["SCENE", "--rays", "--mode", "--kernel", "--camera", "--hits", "--save-rays", "--repeat", "--size",
-              "--samples", "--ao-radius", "--explain", *TREE],
+              "--samples", "--ao-radius", "--explain", *TREE, *FIGURES],
     "render": ["SCENE", "--output", "--view", "--size", "--camera", "--eye", "--target", "--up", "--fov",
                "--samples", *TREE],
     "query": ["SCENE", "--knn", "--radius", "--box", "--queries", "--out", "--sort", "--tree", "--strict", "--repeat"],
@@ -39,6 +39,12 @@ class Usage(ProgramTest):
                 self.assertIn(option, text, command)
             for line in text.splitlines():
                 self.assertFalse(line.strip().startswith("--") and len(line.split()) == 1, f"no words about {line}")
+
+    def test_figures_belong_to_commands_that_print_them(self):
+        for command in (("check", SMALL), ("render", SMALL, "-o", "x.png")):
+            for option in FIGURES:
+                self.assertNotIn(option, self.succeed(command[0], "--help").out)
+                self.fail_with_usage(*command, option, "1", names=[option])
 
     def test_version(self):
         self.assertRegex(self.succeed("--version").out, r"\Araydix \d+\.\d+\.\d+\n\Z")
