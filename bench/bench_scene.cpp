@@ -99,9 +99,8 @@ void add_options(CLI::App& app, SceneBench& options) {
                    "Our trees, beside Embree's LOW, MEDIUM, or the better of MEDIUM and HIGH")
         ->check(CLI::IsMember({"fast", "balanced", "high"}))
         ->capture_default_str();
-    app.add_option("--size", options.size,
-                   "Pixels of a picture of primary rays; as many random rays are sent")
-        ->type_name("WxH")
+    cli::add_size_option(app, options.size,
+                         "Pixels of a picture of primary rays; as many random rays are sent")
         ->capture_default_str();
     app.add_option("--rounds", options.rounds, "Timed rounds after answers are compared")
         ->check(CLI::Range(1, 1000))

@@ -391,6 +391,7 @@ void add_traversal_suite(CLI::App& bench) {
     options->tree.builder = "split";
     options->tree.max_leaf = 8;
     add_tree_options(*command, options->tree);
+    add_tree_figure_options(*command, options->tree);
     add_common_options(*command, options->common);
     command->callback([options, command] {
         options->tree_of_machine = command->get_option("--builder")->count() == 0 &&

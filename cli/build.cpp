@@ -146,6 +146,7 @@ void run_build(const BuildCommand& options) {
         return build(scene.mesh(), how, options.repeat);
     });
     const TreeStats stats = tree_stats(timed.bvh, stats_options(options.tree, options.common));
+    document["scene"]["left_out"] = timed.bvh.left_out();
     Json build = build_json(timed.bvh, stats, timed.fresh);
     build["device"] = options.tree.device;
     if (is_device(options.tree.device)) {
@@ -239,6 +240,7 @@ void add_build_command(CLI::App& app) {
         ->check(file_name())
         ->type_name("FILE.rdx");
     add_tree_options(*command, options->tree);
+    add_tree_figure_options(*command, options->tree);
     add_flatten_option(*command, options->common);
     add_common_options(*command, options->common);
     command->callback([options] {

@@ -14,6 +14,8 @@
 #include <string_view>
 #include <vector>
 
+#include "option_checks.h"
+
 namespace raydix::cli {
 namespace {
 
@@ -365,6 +367,7 @@ void add_man_command(CLI::App& app) {
     auto folder = std::make_shared<std::string>();
     command->add_option("COMMAND", *names, "The command; none: the program");
     command->add_option("--folder", *folder, "Write the pages of all commands into FOLDER instead")
+        ->check(file_name())
         ->type_name("FOLDER");
     command->callback([&app, names, folder] {
         if (folder->empty()) return fmt::print("{}", man_page(command_at(app, *names)));

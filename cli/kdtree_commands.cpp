@@ -22,23 +22,14 @@ struct KdKind {
     static TreeFigures figures(const KdTree& tree) {
         const TreeStats stats = kd_stats(tree);
         const KdTreeOptions& options = tree.options();
-        return {"kdtree",
-                "binary",
-                "primitive",
-                tree.kind(),
-                options.bits,
-                options.max_leaf,
-                options.threads,
-                tree.input_count(),
-                tree.left_out(),
-                stats.nodes,
-                stats.leaves,
-                stats.references,
-                stats.layout_nodes,
-                stats.max_depth,
-                stats.depth_bound ? Json(*stats.depth_bound) : Json(nullptr),
-                stats.bytes,
-                tree.peak_bytes(),
+        return {"kdtree",           "binary",
+                tree.kind(),        options.bits,
+                options.max_leaf,   options.threads,
+                tree.input_count(), tree.left_out(),
+                stats.nodes,        stats.leaves,
+                stats.references,   stats.layout_nodes,
+                stats.max_depth,    stats.depth_bound ? Json(*stats.depth_bound) : Json(nullptr),
+                stats.bytes,        tree.peak_bytes(),
                 stats.tree_hash};
     }
     static void add(Json&, const KdTree&) {}

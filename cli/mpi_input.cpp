@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <raydix/rdx.h>
 
+#include <chrono>
 #include <filesystem>
 #include <optional>
 #include <unordered_map>
@@ -79,6 +80,13 @@ void refuse_clouds(const MpiOptions& options) {
     }
 }
 
+double ms_since(std::chrono::steady_clock::time_point start) {
+    return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
+        .count();
+}
+
+bool is_builtin(const std::string& scene) { return scene.starts_with("builtin:"); }
+
 std::uint64_t over_ranks(std::uint64_t value, MPI_Op op) {
     MPI_Allreduce(MPI_IN_PLACE, &value, 1, MPI_UINT64_T, op, MPI_COMM_WORLD);
     return value;
@@ -139,27 +147,32 @@ void require_writable_results(const CLI::App& command, const CommonOptions& comm
 SpreadModel spread_model(const MpiOptions& options) {
     SpreadModel model;
     const bool says = options.common.prints_tables() && mpi_rank() == 0 && mpi_ranks() > 1;
-    const bool is_builtin = options.scene.rfind("builtin:", 0) == 0;
+    const auto start = std::chrono::steady_clock::now();
     std::vector<std::filesystem::path> files{options.scene};
     files.insert(files.end(), options.more.begin(), options.more.end());
-    auto read = is_builtin ? std::nullopt : mpi::load_part(MPI_COMM_WORLD, files);
+    auto read = is_builtin(options.scene) ? std::nullopt : mpi::load_part(MPI_COMM_WORLD, files);
     if (read) {
         if (read->triangles > 0) refuse_clouds(options);
         if (says) fmt::print("reading      each rank reads its part of {}\n", options.names());
         model.part = std::move(read->mesh);
         model.triangles = read->triangles;
+        model.vertices = read->vertices;
+        model.load_ms = ms_since(start);
         return model;
     }
     if (says) fmt::print("reading      rank 0 reads all of {} and scatters it\n", options.names());
     read_whole(model, options);
-    model.triangles = mpi_rank() == 0 ? model.whole.mesh().triangles.size() : 0;
-    MPI_Bcast(&model.triangles, 1, MPI_UINT64_T, 0, MPI_COMM_WORLD);
     const Mesh none;
     const Mesh& whole = mpi_rank() == 0 ? model.whole.mesh() : none;
+    std::uint64_t sizes[2] = {whole.triangles.size(), whole.vertices.size()};
+    MPI_Bcast(sizes, 2, MPI_UINT64_T, 0, MPI_COMM_WORLD);
+    model.triangles = sizes[0];
+    model.vertices = sizes[1];
     if (model.triangles > 0)
         model.part = scatter_triangles(whole);
     else
         model.part.vertices = scatter(whole.vertices);
+    model.load_ms = ms_since(start);
     return model;
 }
 
@@ -184,10 +197,28 @@ void read_whole(SpreadModel& model, const MpiOptions& options) {
     model.is_whole_read = true;
 }
 
-Json mpi_document(const std::string& command, const MpiOptions& options) {
+Json SpreadModel::json(const MpiOptions& options) const {
+    const auto without_folder = [](const std::string& file) {
+        return is_builtin(file) ? file : std::filesystem::path(file).filename().string();
+    };
+    std::string name = without_folder(options.scene);
+    for (const std::string& file : options.more) name.append(", ").append(without_folder(file));
+    return {{"name", name},
+            {"triangles", triangles},
+            {"points", triangles == 0 ? vertices : 0},
+            {"vertices", vertices}};
+}
+
+Json mpi_document(const std::string& command, const MpiOptions& options, const SpreadModel& model) {
+    return mpi_document(command, options, model.json(options), model.load_ms);
+}
+
+Json mpi_document(const std::string& command, const MpiOptions& options, const Json& scene,
+                  double load_ms) {
     Json document = new_document(command);
     document["ranks"] = mpi_ranks();
-    document["scene"] = options.names();
+    document["scene"] = scene;
+    document["load_ms"] = load_ms;
     document["partition"] = options.partition;
     return document;
 }

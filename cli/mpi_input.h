@@ -32,10 +32,14 @@ void require_writable_results(const CLI::App& command, const CommonOptions& comm
                               const std::string& prefix, const std::string& ending);
 
 struct SpreadModel {
-    Model whole;                  // of rank 0, flat, if it has been read
-    bool is_whole_read = false;   // the same on all ranks
-    Mesh part;                    // triangles and their vertices; or points
-    std::uint64_t triangles = 0;  // of all ranks
+    Model whole;                                // of rank 0, flat, if it has been read
+    bool is_whole_read = false;                 // the same on all ranks
+    Mesh part;                                  // triangles and their vertices; or points
+    std::uint64_t triangles = 0, vertices = 0;  // of all files
+    double load_ms = 0;                         // of this rank
+
+    /// The `scene` of a document.
+    [[nodiscard]] Json json(const MpiOptions& options) const;
 };
 
 /// Collective. Says who reads. Triangles, or else points, come in equal runs.
@@ -49,8 +53,11 @@ void require_triangles(const SpreadModel& model, const MpiOptions& options, cons
 /// Collective. For what rank 0 does alone: it reads all of the files unless it has.
 void read_whole(SpreadModel& model, const MpiOptions& options);
 
-/// {command, version, machine, ranks, partition}.
-[[nodiscard]] Json mpi_document(const std::string& command, const MpiOptions& options);
+/// {command, version, machine, ranks, scene, load_ms, partition}.
+[[nodiscard]] Json mpi_document(const std::string& command, const MpiOptions& options,
+                                const Json& scene, double load_ms);
+[[nodiscard]] Json mpi_document(const std::string& command, const MpiOptions& options,
+                                const SpreadModel& model);
 /// Collective. The figures of all ranks: sums, and the greatest of what each has.
 [[nodiscard]] Json holding_json(const mpi::Holding& holding);
 [[nodiscard]] Json report_json(const mpi::CallReport& report);

@@ -100,7 +100,7 @@ public:
     explicit QueryRun(const MpiQueryCommand& options)
         : options_(options),
           model_(spread_model(options)),
-          document_(mpi_document("mpi query", options)) {
+          document_(mpi_document("mpi query", options, model_)) {
         if (options.closest) require_triangles(model_, options, "closest points");
         if (options.contains) require_triangles(model_, options, "solids");
         if (options.verify || options.queries_file.empty() || asks_vertices())
@@ -112,9 +112,12 @@ public:
     void run() {
         options_.closest || options_.contains ? ask_scene() : ask_points();
         on_first([&] {
+            tell_left_out(document_, document_["holding"]["left_out"], options_.common);
             if (options_.common.prints_tables()) {
-                fmt::print("queries      {}, {} found\n", document_["queries"].get<std::uint64_t>(),
-                           document_["found"].get<std::uint64_t>());
+                fmt::print("queries      {}, {} found, {} invalid\n",
+                           document_["queries"].get<std::uint64_t>(),
+                           document_["found"].get<std::uint64_t>(),
+                           document_["invalid_queries"].get<std::uint64_t>());
                 print_report(document_["report"]);
             }
             write_json(document_, options_.common);
@@ -132,12 +135,12 @@ private:
         document_["holding"] = holding_json(points.holding());
         if (options_.k) {
             const auto rows = points.knn(mine_, *options_.k);
-            take(rows.counts.found, rows.report);
+            take(rows.counts, rows.report);
             finish_rows(rows, {},
                         [&](const Points& alone) { return knn(alone, queries_, *options_.k); });
         } else {
             const auto rows = points.radius(mine_, *options_.radius);
-            take(rows.counts.found, rows.report);
+            take(rows.counts, rows.report);
             finish_rows(rows, rows.offsets.view(), [&](const Points& alone) {
                 return radius_search(alone, queries_, *options_.radius);
             });
@@ -171,11 +174,11 @@ private:
         document_["holding"] = holding_json(scene.holding());
         if (options_.closest) {
             const auto answers = scene.closest_points(mine_);
-            take(answers.counts.found, answers.report);
+            take(answers.counts, answers.report);
             finish_closest(answers.values);
         } else {
             const auto answers = scene.contains(mine_);
-            take(answers.counts.found, answers.report);
+            take(answers.counts, answers.report);
             finish_inside(answers.values);
         }
     }
@@ -215,11 +218,12 @@ private:
     }
     [[nodiscard]] bool wants_whole() const { return options_.verify || !options_.prefix.empty(); }
 
-    void take(std::uint64_t found, const mpi::CallReport& report) {
-        std::uint64_t sums[2] = {mine_.size(), found};
-        MPI_Allreduce(MPI_IN_PLACE, sums, 2, MPI_UINT64_T, MPI_SUM, MPI_COMM_WORLD);
+    void take(const QueryCounts& counts, const mpi::CallReport& report) {
+        std::uint64_t sums[3] = {mine_.size(), counts.found, counts.invalid_queries};
+        MPI_Allreduce(MPI_IN_PLACE, sums, 3, MPI_UINT64_T, MPI_SUM, MPI_COMM_WORLD);
         document_["queries"] = sums[0];
         document_["found"] = sums[1];
+        document_["invalid_queries"] = sums[2];
         document_["report"] = report_json(report);
         document_["verified"] = options_.verify;
     }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <raydix/picture.h>
 #include <raydix/rdx.h>
+#include <raydix/scene_info.h>
 
 #include <chrono>
 #include <cstring>
@@ -13,6 +14,7 @@
 #include "mpi_commands.h"
 #include "mpi_input.h"
 #include "mpi_ranks.h"
+#include "option_checks.h"
 #include "picture_options.h"
 #include "scene_file.h"
 
@@ -63,8 +65,12 @@ Shot shot_of_first(const MpiRenderCommand& command, const Model& model) {
 struct Rendered {
     Shot shot;
     Picture picture;  // of rank 0
-    Json holding;     // of a distributed scene
-    Scene alone;      // of rank 0, if --verify asks for it
+    Json scene;       // of the document
+    double load_ms = 0;
+    Json holding;  // of a distributed scene
+    std::uint64_t left_out = 0;
+    Scene alone;  // of rank 0, if --verify asks for it
+    Aabb bounds;  // of the whole, on rank 0
     double ms = 0;
 };
 
@@ -81,11 +87,12 @@ void show_progress(Shot& shot, Progress& progress) {
 }
 
 /// What raydix render shows of one file, or the mesh of several; gives its cameras.
-Model load_shown(const MpiRenderCommand& command, Scene& scene) {
+Model load_shown(const MpiRenderCommand& command, Rendered& rendered) {
     const bool is_one = command.more.empty();
     if (is_one && is_scene_file(command.scene)) {
         RdxScene file = load_rdx_scene(command.scene);
-        scene = std::move(file.scene);
+        rendered.alone = std::move(file.scene);
+        rendered.scene = scene_file_json(file);
         return model_of(file);
     }
     const bool is_tree = is_one && is_rdx(command.scene);
@@ -97,14 +104,21 @@ Model load_shown(const MpiRenderCommand& command, Scene& scene) {
                            : load_files(command);
     SceneOptions options;
     options.threads = command.common.threads;
-    about(command.names(), [&] { scene = Scene(model, options); });
+    about(command.names(), [&] { rendered.alone = Scene(model, options); });
+    rendered.scene = scene_json(model);
     return model;
 }
 
 /// Each rank reads the scene itself.
 Rendered render_replicated(const MpiRenderCommand& command) {
     Rendered rendered;
-    on_each([&] { rendered.shot = shot_of(command, load_shown(command, rendered.alone)); });
+    on_each([&] {
+        const Model model = load_shown(command, rendered);
+        rendered.load_ms = model.load_ms;
+        rendered.left_out = left_out_triangles(rendered.alone);
+        rendered.shot = shot_of(command, model);
+    });
+    rendered.bounds = rendered.alone.bounds();
     Progress progress("rendering", command.common);
     show_progress(rendered.shot, progress);
     timed(rendered, [&] {
@@ -122,13 +136,17 @@ Rendered render_distributed(const MpiRenderCommand& command) {
     rendered.shot = shot_of_first(command, model.whole);
     const MeshView view(model.part);
     const mpi::DistributedScene scene(MPI_COMM_WORLD, std::span(&view, 1), command.scene_options());
+    rendered.scene = model.json(command);
+    rendered.load_ms = model.load_ms;
     rendered.holding = holding_json(scene.holding());
+    rendered.left_out = scene.holding().left_out;
     Progress progress("rendering", command.common);
     show_progress(rendered.shot, progress);
     timed(rendered, [&] {
         rendered.picture = mpi::render(scene, rendered.shot.camera, rendered.shot.options);
     });
     on_first([&] {
+        rendered.bounds = inspect(model.whole.mesh()).bounds;
         if (command.verify) rendered.alone = Scene(model.whole.mesh());
     });
     return rendered;
@@ -142,7 +160,7 @@ bool same_picture(const Picture& a, const Picture& b) {
 void run_render(const MpiRenderCommand& command) {
     Rendered rendered =
         command.is_distributed ? render_distributed(command) : render_replicated(command);
-    Json document = mpi_document("mpi render", command);
+    Json document = mpi_document("mpi render", command, rendered.scene, rendered.load_ms);
     on_first([&] {
         const RenderOptions& options = rendered.shot.options;
         if (command.verify) {
@@ -158,16 +176,14 @@ void run_render(const MpiRenderCommand& command) {
             fmt::print("{} ({} x {}, {}, {} ranks, scene {}, {:.0f} ms)\n",
                        command.picture.out_file, options.width, options.height,
                        command.picture.view, mpi_ranks(), held, rendered.ms);
+        tell_left_out(document, rendered.left_out, command.common);
         if (command.is_distributed)
             document["holding"] = rendered.holding;
         else
             document.erase("partition");
-        document["render"] = {{"file", command.picture.out_file},
-                              {"view", command.picture.view},
-                              {"width", options.width},
-                              {"height", options.height},
-                              {"scene", held},
-                              {"ms", rendered.ms}};
+        document["render"] =
+            picture_json(command.picture, rendered.shot.camera, options, rendered.bounds);
+        document["render"].update({{"scene", held}, {"ms", rendered.ms}});
         document["verified"] = command.verify;
         write_json(document, command.common);
     });
@@ -186,7 +202,7 @@ void add_mpi_render(CLI::App& app) {
     command->add_flag("--distributed", options->is_distributed,
                       "Spread the scene over the ranks. Without it each rank reads and holds all");
     command->callback([options, command] {
-        on_first([&] { check_picture_options(options->picture); });
+        on_first([&] { require_picture(options->picture.out_file); });
         require_writable_results(*command, options->common, "", "");
         run_render(*options);
     });

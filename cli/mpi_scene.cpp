@@ -46,7 +46,7 @@ void add_tree_hash(SpreadModel& model, const InfoCommand& options, Json& documen
 
 void run_info(const InfoCommand& options) {
     SpreadModel model = spread_model(options);
-    Json document = mpi_document("mpi info", options);
+    Json document = mpi_document("mpi info", options, model);
     if (model.triangles == 0) {
         const mpi::DistributedPoints points(MPI_COMM_WORLD, model.part.vertices, options.options());
         document["holding"] = holding_json(points.holding());
@@ -59,6 +59,7 @@ void run_info(const InfoCommand& options) {
     on_first([&] {
         if (options.common.prints_tables())
             print_holding(document["holding"], model.triangles == 0 ? "points" : "triangles");
+        tell_left_out(document, document["holding"]["left_out"], options.common);
     });
     if (options.with_hash || options.verify) add_tree_hash(model, options, document);
     document["verified"] = options.verify;
@@ -136,7 +137,7 @@ void run_trace(const TraceCommand& options) {
     const std::vector<Ray> mine = scatter(rays);
     const MeshView view(model.part);
     const mpi::DistributedScene scene(MPI_COMM_WORLD, std::span(&view, 1), options.scene_options());
-    Json document = mpi_document("mpi trace", options);
+    Json document = mpi_document("mpi trace", options, model);
     document["holding"] = holding_json(scene.holding());
     document["mode"] = options.mode;
     TraceCounts counts;
@@ -183,8 +184,10 @@ void run_trace(const TraceCommand& options) {
         if (options.common.prints_tables()) {
             print_holding(document["holding"], "triangles");
             fmt::print("rays         {}, {} hits\n", sums[0], sums[1]);
+            print_invalid_rays(sums[2]);
             print_report(document["report"]);
         }
+        tell_left_out(document, document["holding"]["left_out"], options.common);
         write_json(document, options.common);
     });
 }
@@ -213,7 +216,7 @@ void add_mpi_trace(CLI::App& app) {
     command->add_option("--camera", options->camera, "Camera of the rays")
         ->transform(whole_number(0))
         ->capture_default_str();
-    command->add_option("--size", options->size_text, "Pixels, WxH")->capture_default_str();
+    add_size_option(*command, options->size_text, "Pixels")->capture_default_str();
     command->add_option("--mode", options->mode, "Which hits")
         ->check(CLI::IsMember({"closest", "any", "all"}))
         ->capture_default_str();
@@ -221,7 +224,6 @@ void add_mpi_trace(CLI::App& app) {
         "--out", options->prefix,
         "Rank 0 writes PREFIX.prims.npy (64 bits), .t.npy, .uv.npy; or .occluded.npy");
     command->callback([options, command] {
-        static_cast<void>(parse_size(options->size_text));
         if (options->mode == "all")
             refuse_given(*command, {"--out"}, "writes one hit a ray; not with --mode all");
         require_writable_results(*command, options->common, options->prefix,

@@ -20,23 +20,10 @@ struct OctreeKind {
     static TreeFigures figures(const Octree& octree) {
         const OctreeStats stats = octree_stats(octree);
         const OctreeOptions& options = octree.options();
-        return {"octree",
-                "levels",
-                "point",
-                octree.kind(),
-                options.bits,
-                options.max_leaf,
-                options.threads,
-                octree.input_count(),
-                octree.left_out(),
-                stats.nodes,
-                stats.leaves,
-                stats.references,
-                stats.nodes,
-                stats.max_depth,
-                options.max_level,
-                stats.bytes,
-                octree.peak_bytes(),
+        return {"octree",         "levels",          octree.kind(),        options.bits,
+                options.max_leaf, options.threads,   octree.input_count(), octree.left_out(),
+                stats.nodes,      stats.leaves,      stats.references,     stats.nodes,
+                stats.max_depth,  options.max_level, stats.bytes,          octree.peak_bytes(),
                 stats.tree_hash};
     }
     static void add(Json& build, const Octree& octree) {

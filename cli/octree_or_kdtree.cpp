@@ -37,7 +37,8 @@ void print_tree_tail(const TreeFigures& f) {
     const double each =
         f.references ? static_cast<double>(f.bytes) / static_cast<double>(f.references) : 0;
     fmt::print("memory       {:.2f} MB ({:.1f} bytes a {}), peak while building {:.2f} MB\n",
-               static_cast<double>(f.bytes) / 1e6, each, f.element,
+               static_cast<double>(f.bytes) / 1e6, each,
+               f.kind == PrimitiveKind::points ? "point" : "triangle",
                static_cast<double>(f.peak_bytes) / 1e6);
     fmt::print("hash         {}\n", f.tree_hash);
 }

@@ -22,7 +22,7 @@ namespace raydix::cli {
 
 /// Figures that both kinds have.
 struct TreeFigures {
-    const char *tree, *layout, *element;  // "kdtree", "binary", "primitive"
+    const char *tree, *layout;  // "kdtree", "binary"
     PrimitiveKind kind;
     int bits, max_leaf, threads;
     std::uint64_t input_count, left_out, nodes, leaves, references, layout_nodes, max_depth;
@@ -99,6 +99,7 @@ void run_tree_build(const std::string& scene_name, const TreeOptions& tree_optio
     TreeFigures figures = Kind::figures(builds.tree);
     if (is_device(tree_options.device))
         build["peak_bytes"] = figures.peak_bytes = builds.device_bytes;
+    document["scene"]["left_out"] = figures.left_out;
     document["build"] = build;
     if (common.prints_tables()) {
         fmt::print("{}: {} triangles, {} vertices, loaded in {:.1f} ms\n", scene.name,

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <raydix/error.h>
+#include <raydix/files.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -12,6 +13,8 @@
 #include <string_view>
 #include <system_error>
 #include <vector>
+
+#include "options.h"
 
 namespace raydix::cli {
 
@@ -53,8 +56,15 @@ namespace {
 /// A name of a file as given, and where.
 struct NamedFile {
     std::string option, path;
-    bool may_replace = false;  // what is read
+    bool may_replace = false;  // a .rdx file that is read
+    bool is_scene = false;     // with what load_model reads beside it
 };
+
+/// Behind PREFIX of --out, whatever the kind of query.
+constexpr std::string_view endings_of_out[] = {
+    "indices",   "distances", "offsets",          "points",          "uv",     "geometries",
+    "instances", "pairs",     "pairs-geometries", "pairs-instances", "inside", "occluded",
+    "prims",     "t"};
 
 bool is_one_of(const std::string& name, std::initializer_list<std::string_view> names) {
     return std::ranges::find(names, name) != names.end();
@@ -70,46 +80,75 @@ bool same_file(const std::string& a, const std::string& b) {
            fs::weakly_canonical(fs::absolute(b, error), error);
 }
 
+void collect_written(const CLI::App& command, const std::string& name, const std::string& file,
+                     std::vector<NamedFile>& written) {
+    const std::string option = "--" + name;
+    if (name == "out") {
+        for (const std::string_view ending : endings_of_out)
+            written.push_back({option, fmt::format("{}.{}.npy", file, ending)});
+        return;
+    }
+    written.push_back({option, file, name == "output" && command.get_name() == "build"});
+    const CLI::Option* mode = command.get_option_no_throw("--mode");
+    if (name == "hits" && mode != nullptr && mode->count() != 0 && mode->results().back() == "all")
+        written.push_back({option, offsets_file(file)});
+}
+
 void collect_files(const CLI::App& command, std::vector<NamedFile>& written,
                    std::vector<NamedFile>& read) {
     for (const CLI::Option* option : command.get_options()) {
         const std::string name = option->get_single_name();
-        const bool output = is_one_of(name, {"output", "json", "hits", "save-rays", "state"});
-        const bool input =
-            option->get_positional() ||
-            is_one_of(name, {"with", "queries", "rays", "cameras", "machine", "picture"});
+        const bool is_argument = option->get_positional();
         for (const std::string& file : option->results()) {
             if (file.empty() || file == "-") continue;
-            if (output)
-                written.push_back(
-                    {"--" + name, file,
-                     name == "state" || (name == "output" && command.get_name() == "build")});
-            else if (input)
-                read.push_back({option->get_positional() ? name : "--" + name, file});
+            if (is_one_of(name, {"output", "json", "hits", "save-rays", "state", "out"}))
+                collect_written(command, name, file, written);
+            else if (is_argument || is_one_of(name, {"with", "same", "queries", "rays", "cameras",
+                                                     "machine", "picture"}))
+                read.push_back({is_argument ? name : "--" + name, file, false,
+                                is_argument ? name != "RESULT"
+                                            : is_one_of(name, {"with", "same", "queries"})});
         }
     }
     for (const CLI::App* chosen : command.get_subcommands()) collect_files(*chosen, written, read);
 }
 
+/// Adds what scenes are read with. A file that is not there yet replaces none of these.
+void add_files_of_scenes(const std::vector<NamedFile>& written, std::vector<NamedFile>& read) {
+    const auto is_there = [](const NamedFile& file) {
+        std::error_code error;
+        return std::filesystem::is_regular_file(file.path, error);
+    };
+    if (std::ranges::none_of(written, is_there)) return;
+    for (std::size_t k = 0, named = read.size(); k < named; ++k) {
+        if (!read[k].is_scene || is_rdx(read[k].path)) continue;
+        for (const std::filesystem::path& file : files_of_model(read[k].path))
+            read.push_back({read[k].option, file.string()});
+    }
+}
+
 }  // namespace
+
+std::string offsets_file(const std::string& hits_file) {
+    return std::filesystem::path(hits_file).replace_extension(".offsets.npy").string();
+}
 
 void refuse_shared_files(const CLI::App& program) {
     std::vector<NamedFile> written, read;
     collect_files(program, written, read);
-    for (std::size_t k = 0; k < written.size(); ++k) {
-        const NamedFile& file = written[k];
+    for (std::size_t k = 0; k < written.size(); ++k)
         for (std::size_t other = 0; other < k; ++other)
-            if (same_file(file.path, written[other].path))
-                throw CLI::ValidationError(
-                    file.option,
-                    fmt::format("{} is the file of {} too", file.path, written[other].option));
-        if (file.may_replace) continue;
+            if (same_file(written[k].path, written[other].path))
+                throw CLI::ValidationError(written[k].option,
+                                           fmt::format("{} is the file of {} too", written[k].path,
+                                                       written[other].option));
+    add_files_of_scenes(written, read);
+    for (const NamedFile& file : written)
         for (const NamedFile& source : read)
-            if (same_file(file.path, source.path))
+            if (!(file.may_replace && is_rdx(source.path)) && same_file(file.path, source.path))
                 throw CLI::ValidationError(
                     file.option,
                     fmt::format("would replace {}, which is read ({})", file.path, source.option));
-    }
 }
 
 void require_writable(const std::string& file) {

@@ -26,10 +26,13 @@ void refuse_given(const CLI::App& command, std::initializer_list<const char*> na
 /// value is.
 [[nodiscard]] CLI::Validator file_name();
 
-/// Usage error where a file that the command writes is one that it reads, or is written twice. A
-/// tree may take the place of the one it was read from (build -o). For the program's
-/// parse_complete.
+/// Usage error where a file that the command writes is one that it reads, or is written twice;
+/// those that a name stands for are among them (--out PREFIX, cameras beside a scene). A tree may
+/// take the place of the one it was read from (build -o). For the program's parse_complete.
 void refuse_shared_files(const CLI::App& program);
+
+/// Where each ray's hits begin, beside the hits of --mode all.
+[[nodiscard]] std::string offsets_file(const std::string& hits_file);
 
 /// Before the work of which `file` takes the result, as far as can be told then. Empty: nothing to
 /// check. Throws InputError as writing would.

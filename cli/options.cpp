@@ -19,6 +19,8 @@
 namespace raydix::cli {
 namespace {
 
+constexpr const char* tree_group = "Tree";
+
 /// "" or why --device may not be this.
 std::string device_fault(std::string& device) {
     for (const char* word : {"cpu", "cuda", "sim", "opencl", "hip"})
@@ -65,15 +67,14 @@ void add_flatten_option(CLI::App& command, CommonOptions& options) {
 }
 
 void add_tree_options(CLI::App& command, TreeOptions& options) {
-    const char* group = "Tree";
     const auto of_the_build = [&](CLI::Option* option) {
         options.of_the_build.push_back(option);
-        return option->group(group);
+        return option->group(tree_group);
     };
     command.add_option("--tree", options.tree, "Kind of tree")
         ->check(CLI::IsMember({"bvh", "octree", "kdtree"}))
         ->capture_default_str()
-        ->group(group);
+        ->group(tree_group);
     CLI::Option* builder =
         of_the_build(command.add_option("--builder", options.builder,
                                         "Builder (default: that of --quality; on a GPU karras)"))
@@ -111,27 +112,38 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
                 "which is wide8 with shared vertices; cwbvh: build only (default: binary, of the "
                 "engine wide8)")
             ->check(CLI::IsMember({"binary", "wide4", "wide8", "compact", "cwbvh"}))
-            ->group(group);
+            ->group(tree_group);
     command
         .add_option(
             "--device", options.device,
             "Where to build (cpu, cuda, opencl, opencl:N, hip or hip:N) and trace (these and sim)")
         ->check(CLI::Validator(device_fault, "cpu|cuda|opencl[:N]|hip[:N]|sim"))
         ->capture_default_str()
-        ->group(group);
+        ->group(tree_group);
     of_the_build(
         command.add_option("--fit", options.fit, "Boxes: level by level, or bottom-up in one pass"))
         ->check(CLI::IsMember({"levels", "atomic"}));
     of_the_build(command.add_flag("--strict", options.strict,
                                   "Invalid primitives are an error instead of being left out"));
+    command
+        .add_option("--cameras", options.cameras_file,
+                    "Cameras file instead of cameras.json beside the scene")
+        ->check(file_name())
+        ->type_name("FILE")
+        ->group(tree_group);
+    for (const char* name : {"--builder", "--quality", "--reinsertion-rounds", "--fit"})
+        options.of_a_bvh.push_back(command.get_option(name));
+}
+
+void add_tree_figure_options(CLI::App& command, TreeOptions& options) {
     command.add_option("--sah-node", options.sah.node, "SAH cost of an inner node")
         ->check(finite_number(true))
         ->capture_default_str()
-        ->group(group);
+        ->group(tree_group);
     command.add_option("--sah-primitive", options.sah.primitive, "SAH cost of a primitive")
         ->check(finite_number(true))
         ->capture_default_str()
-        ->group(group);
+        ->group(tree_group);
     command
         .add_option("--epo", options.epo_sample,
                     "Also compute end-point overlap, over this part of the triangles")
@@ -140,15 +152,8 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
         ->check(finite_number(false))
         ->check(CLI::Range(1e-9, 1.0))
         ->type_name("SAMPLE")
-        ->group(group);
-    command
-        .add_option("--cameras", options.cameras_file,
-                    "Cameras file instead of cameras.json beside the scene")
-        ->check(file_name())
-        ->type_name("FILE")
-        ->group(group);
-    for (const char* name : {"--builder", "--quality", "--reinsertion-rounds", "--fit",
-                             "--sah-node", "--sah-primitive", "--epo"})
+        ->group(tree_group);
+    for (const char* name : {"--sah-node", "--sah-primitive", "--epo"})
         options.of_a_bvh.push_back(command.get_option(name));
 }
 
@@ -207,7 +212,9 @@ void say_flattened(const std::string& scene, const CommonOptions& common) {
         complain(scene + ": its meshes and nodes are taken as one mesh (--flatten)");
 }
 
-bool is_rdx(const std::string& scene) { return CLI::detail::to_lower(scene).ends_with(".rdx"); }
+bool is_rdx(const std::string& scene) {
+    return CLI::detail::to_lower(scene).ends_with(".rdx") || is_rdx_file(scene);
+}
 
 bool is_scene_file(const std::string& scene) { return is_rdx(scene) && holds_scene(scene); }
 
@@ -338,16 +345,20 @@ CLI::Validator finite_number(bool zero_too) {
         double value = 0;
         const char* end = text.data() + text.size();
         const auto [rest, error] = std::from_chars(text.data(), end, value);
-        const bool good = error == std::errc() && rest == end && std::isfinite(value) &&
-                          (zero_too ? value >= 0 : value > 0);
-        return good ? std::string()
-                    : "'" + text + "' is not a " +
-                          (zero_too ? "number from 0 on" : "number above 0");
+        const auto is_good = [&](auto number) {
+            return std::isfinite(number) && (zero_too ? number >= 0 : number > 0);
+        };
+        const bool is_number = error == std::errc() && rest == end && is_good(value);
+        if (is_number && is_good(static_cast<float>(value))) return std::string();
+        return "'" + text + "' is not a " + (zero_too ? "number from 0 on" : "number above 0") +
+               (is_number ? " that float32 holds" : "");
     };
     return {fault, zero_too ? "NONNEGATIVE" : "POSITIVE"};
 }
 
-Size parse_size(const std::string& text) {
+namespace {
+
+std::optional<Size> size_of(const std::string& text) {
     Size size;
     const char* end = text.data() + text.size();
     const auto [x, width_error] = std::from_chars(text.data(), end, size.width);
@@ -357,8 +368,35 @@ Size parse_size(const std::string& text) {
         if (height_error == std::errc() && rest == end && fits(size.width) && fits(size.height))
             return size;
     }
-    throw CLI::ValidationError("--size",
-                               "'" + text + "' is not WIDTHxHEIGHT with 1 to 16384 pixels each");
+    return {};
+}
+
+std::string size_fault(const std::string& text) {
+    return size_of(text) ? std::string()
+                         : "'" + text + "' is not WIDTHxHEIGHT with 1 to 16384 pixels each";
+}
+
+}  // namespace
+
+Size parse_size(const std::string& text) {
+    const std::optional<Size> size = size_of(text);
+    if (!size) throw CLI::ValidationError("--size", size_fault(text));
+    return *size;
+}
+
+CLI::Option* add_size_option(CLI::App& command, std::string& size, const std::string& what) {
+    return command.add_option("--size", size, what)->check(size_fault)->type_name("WxH");
+}
+
+void add_cameras_option(CLI::App& command, std::string& camera) {
+    command.add_option("--camera", camera, "Number of a camera, or all")
+        ->check([](const std::string& text) {
+            const bool is_known =
+                text == "all" ||
+                (!text.empty() && text.find_first_not_of("0123456789") == std::string::npos);
+            return is_known ? std::string() : "'" + text + "' is neither a number nor 'all'";
+        })
+        ->capture_default_str();
 }
 
 }  // namespace raydix::cli

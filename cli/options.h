@@ -52,12 +52,15 @@ struct TreeOptions {
                                              const CommonOptions& common) const;
 };
 void add_tree_options(CLI::App& command, TreeOptions& options);
+/// Of commands that print figures of the tree: SAH and EPO.
+void add_tree_figure_options(CLI::App& command, TreeOptions& options);
 
 /// A scene and its tree: built, or both read from a .rdx file.
 struct SceneTree {
     Model scene;
     Bvh bvh;
 };
+/// By its name, or by how it begins.
 [[nodiscard]] bool is_rdx(const std::string& scene);
 /// An .rdx file that holds a scene (scene_file.h).
 [[nodiscard]] bool is_scene_file(const std::string& scene);
@@ -96,7 +99,7 @@ void refuse_device(const TreeOptions& tree);
 [[nodiscard]] SceneTree tree_of(Model scene, const std::string& name, const TreeOptions& tree,
                                 const CommonOptions& common);
 
-/// For add_option(...)->check: a finite number above 0, or from 0 on.
+/// For add_option(...)->check: a finite number above 0, or from 0 on, that is one as a float, too.
 [[nodiscard]] CLI::Validator finite_number(bool zero_too);
 
 /// --max-result-bytes.
@@ -122,6 +125,10 @@ struct Size {
     std::uint32_t width = 0, height = 0;
 };
 [[nodiscard]] Size parse_size(const std::string& text);
+/// --size, of which the command takes the text. `what` it is of.
+CLI::Option* add_size_option(CLI::App& command, std::string& size, const std::string& what);
+/// --camera: a number, or all.
+void add_cameras_option(CLI::App& command, std::string& camera);
 
 void add_info_command(CLI::App& app);
 void add_scenes_command(CLI::App& app);

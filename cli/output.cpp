@@ -60,6 +60,16 @@ Json scene_json(const Model& scene) {
             {"cameras", scene.cameras.cameras.size()}};
 }
 
+void tell_left_out(Json& document, std::uint64_t left_out, const CommonOptions& common) {
+    Json& scene = document["scene"];
+    scene["left_out"] = left_out;
+    if (left_out == 0 || !common.prints_tables()) return;
+    const bool is_cloud = scene["points"] != 0;
+    fmt::print("{} left out: not finite, or out of range\n",
+               is_cloud ? counted(left_out, "point", "points")
+                        : counted(left_out, "triangle", "triangles"));
+}
+
 Json mesh_info_json(const MeshInfo& info) {
     const bool bounded = info.bounds.lo.x <= info.bounds.hi.x;
     return {{"bounds", bounded ? Json::array({vec_json(info.bounds.lo), vec_json(info.bounds.hi)})
@@ -138,6 +148,10 @@ void print_stages(const Json& build, std::size_t builds) {
         fmt::print("{:<12} {:>9.2f} {:>9.2f} {:>9.2f}\n", stage, ms.get<double>(),
                    build["ms_spread"]["min"][stage].get<double>(),
                    build["ms_spread"]["max"][stage].get<double>());
+}
+
+void print_invalid_rays(std::uint64_t invalid) {
+    if (invalid != 0) fmt::print("{} rays are invalid and count as misses\n", grouped(invalid));
 }
 
 StatsOptions stats_options(const TreeOptions& tree, const CommonOptions& common) {

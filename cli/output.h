@@ -20,6 +20,9 @@ using Json = nlohmann::ordered_json;
 /// {command, version, machine}: the start of every document.
 [[nodiscard]] Json new_document(const std::string& command);
 [[nodiscard]] Json scene_json(const Model& scene);
+/// Puts `left_out` into the scene of a document: its triangles, or points, that are not finite or
+/// out of range. Tables have a line where there are some.
+void tell_left_out(Json& document, std::uint64_t left_out, const CommonOptions& common);
 [[nodiscard]] Json mesh_info_json(const MeshInfo& info);
 
 /// Median, least and greatest of some repeats. At least one value.
@@ -45,6 +48,8 @@ inline constexpr std::array<std::pair<const char*, double BuildMs::*>, 7> build_
      {"layout", &BuildMs::layout},
      {"total", &BuildMs::total}}};
 void print_stages(const Json& build, std::size_t builds);
+/// A line if there are some.
+void print_invalid_rays(std::uint64_t invalid);
 [[nodiscard]] StatsOptions stats_options(const TreeOptions& tree, const CommonOptions& common);
 void print_tree_table(const Bvh& bvh, const TreeStats& stats);
 
@@ -53,7 +58,8 @@ void require_writable_json(const CommonOptions& common);
 /// Writes the document if one was asked for. Throws InputError that names the file.
 void write_json(const Json& document, const CommonOptions& common);
 
-/// A bar on standard error after the first second, on a terminal only.
+/// A bar on standard error after the first second, on a terminal only. It is wiped when it ends,
+/// which is to be before results are printed.
 class Progress {
 public:
     Progress(std::string what, const CommonOptions& common);

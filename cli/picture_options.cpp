@@ -3,6 +3,7 @@
 #include <raydix/error.h>
 
 #include "option_checks.h"
+#include "ray_launches.h"
 
 namespace raydix::cli {
 namespace {
@@ -39,9 +40,22 @@ RenderOptions PictureOptions::render_options(const CameraSet& cameras,
     return chosen;
 }
 
-void check_picture_options(const PictureOptions& options) {
-    if (!options.size_text.empty()) static_cast<void>(parse_size(options.size_text));
-    require_picture(options.out_file);
+Json picture_json(const PictureOptions& options, const Camera& camera, const RenderOptions& chosen,
+                  const Aabb& bounds) {
+    const auto xyz = [](Vec3 v) { return Json::array({v.x, v.y, v.z}); };
+    const bool is_ao = chosen.view == View::ao;
+    return {{"file", options.out_file},
+            {"view", options.view},
+            {"width", chosen.width},
+            {"height", chosen.height},
+            {"camera", options.moves_camera() ? Json(nullptr) : Json(camera.name)},
+            {"eye", xyz(camera.position)},
+            {"target", xyz(camera.target)},
+            {"up", xyz(camera.up)},
+            {"fov", camera.vfov},
+            {"samples", light_samples(chosen)},
+            {"ao_radius",
+             is_ao ? Json(chosen_ao_radius(chosen.ao_radius, {}, bounds)) : Json(nullptr)}};
 }
 
 void add_picture_options(CLI::App& command, PictureOptions& options,
@@ -55,9 +69,7 @@ void add_picture_options(CLI::App& command, PictureOptions& options,
     command.add_option("--view", options.view, "What to show")
         ->check(CLI::IsMember(views))
         ->capture_default_str();
-    command
-        .add_option("--size", options.size_text, "Pixels (default: of cameras.json, or 1024x768)")
-        ->type_name("WxH");
+    add_size_option(command, options.size_text, "Pixels (default: of cameras.json, or 1024x768)");
     command.add_option("--camera", options.camera, "Number of a camera")
         ->transform(whole_number(0))
         ->capture_default_str();

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "options.h"
+#include "output.h"
 
 namespace raydix::cli {
 
@@ -23,12 +23,17 @@ struct PictureOptions {
     /// InputError: there is no such camera, or cameras.json is at fault and --eye does not replace
     /// it.
     [[nodiscard]] Camera chosen_camera(const Model& scene) const;
+    /// Whether chosen_camera() moved it.
+    [[nodiscard]] bool moves_camera() const {
+        return !eye.empty() || !target.empty() || !up.empty() || fov;
+    }
     /// All but the view.
     [[nodiscard]] RenderOptions render_options(const CameraSet& cameras,
                                                const CommonOptions& common) const;
 };
-/// Before any work: --size must be one, and the picture must have a name that can be written.
-void check_picture_options(const PictureOptions& options);
+/// The start of the `render` object of a document. `bounds`: of the scene.
+[[nodiscard]] Json picture_json(const PictureOptions& options, const Camera& camera,
+                                const RenderOptions& chosen, const Aabb& bounds);
 void add_picture_options(CLI::App& command, PictureOptions& options,
                          const std::vector<std::string>& views);
 

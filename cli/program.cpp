@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -54,11 +55,16 @@ std::vector<std::string> words_of(int argc, char** argv) {
     return words;
 }
 
-/// "", or which word is no command where one is needed.
+/// "", or which word is no command, or no option, where a command is needed.
 std::string unknown_command(const CLI::App& app, const std::vector<std::string>& words) {
     const CLI::App* at = &app;
     for (std::size_t i = 1; i < words.size() && at->get_require_subcommand_min() > 0; ++i) {
-        if (words[i].starts_with("-")) return {};
+        if (words[i].starts_with("-")) {
+            const std::string name = words[i].substr(0, words[i].find('='));
+            if (at->get_option_no_throw(name) != nullptr) return {};
+            return fmt::format("'{}' is not an option of {}; a command comes first", name,
+                               at->get_name());
+        }
         const std::vector<const CLI::App*> there =
             at->get_subcommands([](const CLI::App*) { return true; });
         const auto found = std::ranges::find(there, words[i], &CLI::App::get_name);
@@ -79,9 +85,12 @@ std::string unknown_command(const CLI::App& app, const std::vector<std::string>&
 int usage(const CLI::App& app, const CLI::ParseError& error,
           const std::vector<std::string>& words) {
     if (error.get_exit_code() == 0) return app.exit(error);
-    const std::string unknown = unknown_command(app, words);
-    return report(
-        (unknown.empty() ? error.what() : unknown) + "; run with --help for more information", 2);
+    std::string fault = unknown_command(app, words);
+    // CLI11 names these from the last to the first.
+    if (fault.empty() && dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr)
+        fault = fmt::format("not expected: {}", fmt::join(app.remaining(true), " "));
+    return report((fault.empty() ? error.what() : fault) + "; run with --help for more information",
+                  2);
 }
 
 }  // namespace

@@ -73,6 +73,7 @@ struct QueriedScene {
 
 /// The `solid` object of a document.
 [[nodiscard]] Json solid_json(const Solid& solid);
+void print_solid(const Json& solid);
 [[nodiscard]] QueryFigures answer_signed(const QueryCommand& options, const Solid& solid,
                                          const std::vector<Vec3>& queries);
 

@@ -114,6 +114,14 @@ Json solid_json(const Solid& solid) {
             {"open_edges", solid.open_edges()}};
 }
 
+void print_solid(const Json& solid) {
+    const auto open = solid["open_edges"].get<std::uint64_t>();
+    fmt::print(
+        "solid        {}{}, inside by {}\n", solid["closure"].get<std::string>(),
+        open == 0 ? std::string() : fmt::format(" ({})", counted(open, "open edge", "open edges")),
+        solid["rule"] == "winding" ? "winding number" : solid["rule"].get<std::string>());
+}
+
 QueryFigures answer_signed(const QueryCommand& options, const Solid& solid,
                            const std::vector<Vec3>& queries) {
     std::vector<float> distances(queries.size());
@@ -148,7 +156,11 @@ void run_mesh_query(const QueryCommand& options) {
                                          : answer_pairs(options, tree);
     });
     document["query"] = Json::array({query_json(figures)});
-    if (options.common.prints_tables()) print_query(document["query"][0]);
+    tell_left_out(document, tree.bvh.left_out(), options.common);
+    if (options.common.prints_tables()) {
+        if (options.signed_distance) print_solid(document["solid"]);
+        print_query(document["query"][0]);
+    }
     write_json(document, options.common);
 }
 

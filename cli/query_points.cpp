@@ -147,6 +147,7 @@ void run_point_query(const QueryCommand& options) {
     });
     Json document = new_document("query");
     document["scene"] = scene_json(scene);
+    document["scene"]["left_out"] = index.left_out();
     document["load_ms"] = scene.load_ms;
     document["build"] = index_json(index, options.common.threads);
     Json query = query_json(answer(options, index, scene));

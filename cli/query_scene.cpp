@@ -4,6 +4,7 @@
 #include <raydix/arrays.h>
 #include <raydix/rdx_scene.h>
 #include <raydix/scene.h>
+#include <raydix/scene_info.h>
 #include <raydix/scene_pairs.h>
 #include <raydix/scene_queries.h>
 #include <raydix/solid.h>
@@ -169,7 +170,11 @@ void run_scene_query(const QueryCommand& options, const QueriedScene& queried,
                                          : pairs_of_scene(options, queried, other);
     });
     document["query"] = Json::array({query_json(figures)});
-    if (options.common.prints_tables()) print_query(document["query"][0]);
+    tell_left_out(document, left_out_triangles(queried.scene), options.common);
+    if (options.common.prints_tables()) {
+        if (options.signed_distance) print_solid(document["solid"]);
+        print_query(document["query"][0]);
+    }
     write_json(document, options.common);
 }
 

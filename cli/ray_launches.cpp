@@ -29,11 +29,8 @@ std::vector<Camera> chosen_cameras(const std::string& which, const Model& scene)
     const std::vector<Camera>& all = scene.cameras.cameras;
     if (which == "all") return all;
     std::size_t index = 0;
-    const char* end = which.data() + which.size();
-    const auto [rest, error] = std::from_chars(which.data(), end, index);
-    if (error != std::errc() || rest != end)
-        throw CLI::ValidationError("--camera", "'" + which + "' is neither a number nor 'all'");
-    if (index >= all.size())
+    const auto read = std::from_chars(which.data(), which.data() + which.size(), index);
+    if (read.ec != std::errc() || index >= all.size())
         throw InputError(scene.name + ": camera " + which + " is past the last of " +
                          std::to_string(all.size()) + " cameras");
     return {all[index]};
@@ -45,12 +42,9 @@ Size chosen_size(const LaunchOptions& options, const Model& scene) {
 }
 
 void add_launch_options(CLI::App& command, LaunchOptions& options) {
-    command.add_option("--camera", options.camera, "Number of a camera, or all")
-        ->capture_default_str();
-    command
-        .add_option("--size", options.size_text,
-                    "Pixels of the cameras (default: of cameras.json, or 1024x768)")
-        ->type_name("WxH");
+    add_cameras_option(command, options.camera);
+    add_size_option(command, options.size_text,
+                    "Pixels of the cameras (default: of cameras.json, or 1024x768)");
     command.add_option("--samples", options.samples, "Secondary rays per primary hit")
         ->transform(whole_number(1, 1024))
         ->capture_default_str();

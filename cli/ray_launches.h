@@ -80,7 +80,7 @@ private:
     std::vector<View> views_;
 };
 
-/// --camera: all of the scene's, or one.
+/// --camera, as add_cameras_option takes it: all of the scene's, or one.
 [[nodiscard]] std::vector<Camera> chosen_cameras(const std::string& which, const Model& scene);
 /// --size, or of cameras.json.
 [[nodiscard]] Size chosen_size(const LaunchOptions& options, const Model& scene);

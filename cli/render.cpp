@@ -2,11 +2,14 @@
 #include <fmt/format.h>
 #include <raydix/error.h>
 #include <raydix/picture.h>
+#include <raydix/scene_info.h>
 
+#include <algorithm>
 #include <chrono>
 #include <memory>
 #include <utility>
 
+#include "option_checks.h"
 #include "output.h"
 #include "picture_options.h"
 #include "scene_file.h"
@@ -23,6 +26,16 @@ struct RenderCommand : PictureOptions {
     TreeViewOptions tree_view;
 };
 
+void require_triangles(const Model& model, const std::string& scene) {
+    const auto has_triangles = [](const Mesh& mesh) { return !mesh.triangles.empty(); };
+    const auto has_vertices = [](const Mesh& mesh) { return !mesh.vertices.empty(); };
+    if (std::ranges::none_of(model.meshes, has_triangles) &&
+        std::ranges::any_of(model.meshes, has_vertices))
+        throw InputError(scene +
+                         ": it holds points, and this view needs triangles; --view tree and --view "
+                         "slice show the tree of points");
+}
+
 /// Without a binary tree, unless the options ask for one.
 SceneTree load_shown(const RenderCommand& options, std::optional<Scene>& scene, Json& about_it) {
     if (is_scene_file(options.scene)) {
@@ -32,9 +45,13 @@ SceneTree load_shown(const RenderCommand& options, std::optional<Scene>& scene, 
         scene.emplace(std::move(file.scene));
         return {std::move(model), {}};
     }
-    if (is_rdx(options.scene) || !serves_a_scene(options.tree, options.common))
-        return load_scene_tree(options.scene, options.tree, options.common);
+    if (is_rdx(options.scene) || !serves_a_scene(options.tree, options.common)) {
+        SceneTree tree = load_scene_tree(options.scene, options.tree, options.common);
+        require_triangles(tree.scene, options.scene);
+        return tree;
+    }
     Model model = load_structured_model(options.scene, options.tree, options.common);
+    require_triangles(model, options.scene);
     about(options.scene,
           [&] { scene.emplace(model, scene_options(options.tree, options.common)); });
     return {std::move(model), {}};
@@ -64,10 +81,10 @@ void run_render(RenderCommand options) {
     RenderOptions render_options = options.render_options(cameras, options.common);
     render_options.view = of_tree ? View::shaded : view_from_name(options.view);
     const Size size{render_options.width, render_options.height};
-    Progress progress("rendering", options.common);
-    render_options.progress = [&](double part) { progress.show(part); };
     const auto start = std::chrono::steady_clock::now();
     const Picture picture = about(options.scene, [&] {
+        Progress progress("rendering", options.common);
+        render_options.progress = [&](double part) { progress.show(part); };
         if (options.view == "slice") return draw_slice(tree_scene, options.tree_view, size);
         if (of_tree) return render_tree(input.bvh, camera, tree_scene.boxes, render_options);
         return scene ? render(*scene, camera, render_options)
@@ -83,10 +100,16 @@ void run_render(RenderCommand options) {
                    options.view, ms);
     Json document = new_document("render");
     document["scene"] = about_scene.is_null() ? scene_json(input.scene) : about_scene;
+    tell_left_out(document, scene ? left_out_triangles(*scene) : input.bvh.left_out(),
+                  options.common);
     document["load_ms"] = input.scene.load_ms;
-    document["render"] = {{"file", options.out_file}, {"view", options.view},
-                          {"width", size.width},      {"height", size.height},
-                          {"camera", camera.name},    {"ms", ms}};
+    document["render"] =
+        picture_json(options, camera, render_options, scene ? scene->bounds() : input.bvh.bounds());
+    if (of_tree) document["render"]["samples"] = 0;
+    if (options.view == "slice")
+        for (const char* field : {"camera", "eye", "target", "up", "fov"})
+            document["render"][field] = nullptr;
+    document["render"]["ms"] = ms;
     write_json(document, options.common);
 }
 
@@ -106,7 +129,7 @@ void add_render_command(CLI::App& app) {
     add_flatten_option(*command, options->common);
     add_common_options(*command, options->common);
     command->callback([options] {
-        check_picture_options(*options);
+        require_picture(options->out_file);
         require_writable_json(options->common);
         run_render(*options);
     });

@@ -112,6 +112,13 @@ void run_report(const ReportCommand& options) {
                    grouped((html.size() + 999) / 1000));
 }
 
+void require_page_name(const std::string& file) {
+    const std::string ending =
+        CLI::detail::to_lower(std::filesystem::path(file).extension().string());
+    if (!ending.empty() && ending != ".html" && ending != ".htm")
+        throw CLI::ValidationError("--output", "'" + file + "' is no name of a page: .html");
+}
+
 }  // namespace
 
 void add_report_command(CLI::App& app) {
@@ -138,8 +145,7 @@ void add_report_command(CLI::App& app) {
         ->add_option("--scenes", options->scene_folder,
                      "Where scene files that the documents name lie (default: here)")
         ->type_name("FOLDER");
-    command->add_option("--size", options->size_text, "Pixels of rendered pictures")
-        ->type_name("WxH")
+    add_size_option(*command, options->size_text, "Pixels of rendered pictures")
         ->capture_default_str();
     command->add_option("--threads", options->common.threads, "Threads to use (0: all)")
         ->transform(whole_number(0, 1024));
@@ -148,6 +154,7 @@ void add_report_command(CLI::App& app) {
         ->transform(whole_number(0))
         ->capture_default_str();
     command->callback([options] {
+        require_page_name(options->out_file);
         require_writable(options->out_file);
         run_report(*options);
     });

@@ -1,6 +1,7 @@
 #include "scene_file.h"
 
 #include <fmt/format.h>
+#include <raydix/scene_info.h>
 
 #include <chrono>
 #include <utility>
@@ -9,13 +10,10 @@
 #include "scene_trace.h"
 
 namespace raydix::cli {
-namespace {
 
 const char* layout_name(const SceneOptions& options) {
     return options.compact ? "compact" : "wide8";
 }
-
-}  // namespace
 
 const char* quality_name(Quality quality) {
     return quality == Quality::fast ? "fast" : quality == Quality::high ? "high" : "balanced";
@@ -76,6 +74,7 @@ void build_scene_file(Model model, const std::string& scene, const std::string& 
                    spread.median, spread.min, spread.max);
         fmt::print("written      {}\n", file);
     }
+    tell_left_out(document, left_out_triangles(made), common);
     write_json(document, common);
 }
 
@@ -118,28 +117,6 @@ Json scene_file_json(const RdxScene& file) {
             {"quality", quality_name(file.options.quality)},
             {"layout", layout_name(file.options)},
             {"bytes", file.counts.bytes}};
-}
-
-void print_scene_file(const RdxScene& file) {
-    const RdxCounts& counts = file.counts;
-    fmt::print("scene        {}\n", file.name);
-    fmt::print("holds        {}, {}, {}\n", counted(counts.scenes, "scene", "scenes"),
-               counted(counts.meshes, "mesh", "meshes"),
-               counted(counts.instances, "instance", "instances"));
-    fmt::print("triangles    {}\n", grouped(counts.triangles));
-    fmt::print("vertices     {}\n", grouped(counts.vertices));
-    if (counts.shapes != 0) fmt::print("shapes       {}\n", grouped(counts.shapes));
-    const Aabb bounds = file.scene.bounds();
-    if (bounds.lo.x <= bounds.hi.x)
-        fmt::print("bounds       ({:g}, {:g}, {:g}) to ({:g}, {:g}, {:g})\n", bounds.lo.x,
-                   bounds.lo.y, bounds.lo.z, bounds.hi.x, bounds.hi.y, bounds.hi.z);
-    else
-        fmt::print("bounds       none\n");
-    fmt::print("trees        {} nodes, layout {}, quality {}\n", grouped(counts.nodes),
-               layout_name(file.options), quality_name(file.options.quality));
-    fmt::print("cameras      {}\n", file.cameras.cameras.size());
-    fmt::print("memory       {:.2f} MB\n", static_cast<double>(counts.bytes) / 1e6);
-    fmt::print("loaded in    {:.1f} ms\n", file.load_ms);
 }
 
 }  // namespace raydix::cli

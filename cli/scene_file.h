@@ -11,6 +11,7 @@
 namespace raydix::cli {
 
 [[nodiscard]] const char* quality_name(Quality quality);
+[[nodiscard]] const char* layout_name(const SceneOptions& options);
 
 /// Whether `build -o` writes a scene: the user chose its layout, or the model has several meshes or
 /// nodes and no option asks for one binary tree.
@@ -29,6 +30,5 @@ void build_scene_file(Model model, const std::string& scene, const std::string& 
 /// What other commands take of it: name, cameras and the time of loading, without a mesh.
 [[nodiscard]] Model model_of(const RdxScene& file);
 [[nodiscard]] Json scene_file_json(const RdxScene& file);
-void print_scene_file(const RdxScene& file);
 
 }  // namespace raydix::cli

@@ -71,6 +71,7 @@ void run_simulate(const SimulateCommand& options) {
         else
             launches.emplace(options.launches, input, options.common);
         if (options.common.prints_tables()) print_head(options, machine, tree);
+        tell_left_out(document, input.bvh.left_out(), options.common);
         const auto hand_out = [&](const std::vector<SimulationRow>& rows) {
             for (const SimulationRow& row : rows)
                 document["simulate"].push_back(simulation_json(row));
@@ -125,6 +126,7 @@ void add_simulate_command(CLI::App& app) {
     options->tree.builder = "split";
     options->tree.max_leaf = 8;
     add_tree_options(*command, options->tree);
+    add_tree_figure_options(*command, options->tree);
     add_flatten_option(*command, options->common);
     add_common_options(*command, options->common);
     command->get_option("--builder")->description("Builder (default: split, without --quality)");

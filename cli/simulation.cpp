@@ -274,7 +274,14 @@ std::vector<SimulationRow> simulate_rays(const SceneTree& input, const WarpTree&
                         .builder = std::string(builder_name(input.bvh.options().builder)),
                         .units = {}});
     add_unit(tree, {rays, 1.0}, runs, rows, common);
+    const std::uint64_t invalid = count_invalid_rays(rays, common.threads);
+    for (SimulationRow& row : rows) row.invalid_rays = invalid;
     return rows;
+}
+
+std::uint64_t count_invalid_rays(std::span<const Ray> rays, int threads) {
+    std::vector<Hit> unused(rays.size());
+    return trace(Bvh(), rays, unused, {.threads = threads}).invalid_rays;
 }
 
 namespace {
@@ -315,6 +322,7 @@ Json simulation_json(const SimulationRow& row) {
             {"launches", row.sum.launches},
             {"hits", row.sum.hits},
             {"different_hits", row.different_hits},
+            {"invalid_rays", row.invalid_rays},
             {"mrays_per_s_bound", or_null(any, rates.bound)},
             {"mrays_per_s_scheduled", or_null(any && row.whole_launches, rates.scheduled)},
             {"mrays_per_s_single_warps", or_null(any && row.whole_launches, rates.single_warps)},
@@ -410,6 +418,7 @@ void print_simulation(const std::vector<SimulationRow>& rows) {
             fmt::print("    {} hits differ from the scalar reference's\n",
                        grouped(row.different_hits));
     }
+    print_invalid_rays(rows.front().invalid_rays);
 }
 
 void print_steps_to_scheduled(const std::vector<SimulationRow>& rows) {
@@ -442,6 +451,19 @@ void check_machine(const std::string& name_or_file, std::span<const SimulateOpti
     name_or_file.ends_with(".json") ? about(name_or_file, check) : check();
 }
 
+namespace {
+
+/// The same work would be done twice.
+void refuse_repeats(const std::string& names, const char* option) {
+    std::vector<std::string> sorted = split(names);
+    std::ranges::sort(sorted);
+    const auto twice = std::ranges::adjacent_find(sorted);
+    if (twice != sorted.end())
+        throw CLI::ValidationError(option, "'" + *twice + "' is given twice");
+}
+
+}  // namespace
+
 std::vector<WarpKernel> kernels_from(const std::string& names) {
     if (names == "all") return {warp_kernel_family().begin(), warp_kernel_family().end()};
     std::vector<WarpKernel> kernels;
@@ -450,6 +472,7 @@ std::vector<WarpKernel> kernels_from(const std::string& names) {
         } catch (const InputError& error) {
             throw CLI::ValidationError("--kernel", error.what());
         }
+    refuse_repeats(names, "--kernel");
     return kernels;
 }
 
@@ -474,6 +497,7 @@ std::vector<RayKind> kinds_from(const std::string& names) {
                 "--rays", "'" + name + "' is not primary, ao, diffuse, diffuse_shuffled or all");
         kinds.push_back(*kind);
     }
+    refuse_repeats(names, "--rays");
     return kinds;
 }
 

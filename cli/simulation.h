@@ -38,6 +38,7 @@ struct SimulationRow {
     double part_taken = 1.0;                           // of all rays
     bool whole_launches = true;                        // else there is no launch to schedule
     std::uint64_t different_hits = 0;                  // from those of the scalar reference
+    std::uint64_t invalid_rays = 0;                    // of a file
     std::vector<SimulatedRates> units;                 // of each launch or run that was traced
     std::shared_ptr<const LaunchTimes> all = nullptr;  // of those that were not, too
 
@@ -83,6 +84,9 @@ struct SimulationEnd {
                                                        const std::string& name,
                                                        std::vector<SimulateOptions> runs,
                                                        const CommonOptions& common);
+
+/// The simulator leaves these out without a word.
+[[nodiscard]] std::uint64_t count_invalid_rays(std::span<const Ray> rays, int threads);
 
 [[nodiscard]] Json simulation_json(const SimulationRow& row);
 [[nodiscard]] Json machine_model_json(const MachineModel& machine);

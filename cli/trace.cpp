@@ -3,6 +3,7 @@
 #include <raydix/error.h>
 #include <raydix/rays.h>
 #include <raydix/result_limit.h>
+#include <raydix/scene_info.h>
 #include <raydix/trace.h>
 
 #include <chrono>
@@ -220,9 +221,7 @@ void save_kept(const TraceCommand& options, Mode mode, const Kept& kept, HitFiel
     if (options.hits_file.empty()) return;
     if (mode == Mode::any) return save_occluded(options.hits_file, kept.occluded);
     save_hits(options.hits_file, kept.hits, fields);
-    if (mode == Mode::all)
-        save_offsets(std::filesystem::path(options.hits_file).replace_extension(".offsets.npy"),
-                     kept.offsets);
+    if (mode == Mode::all) save_offsets(offsets_file(options.hits_file), kept.offsets);
 }
 
 RayKind ray_kind(const std::string& name) {
@@ -317,8 +316,7 @@ void print_trace(const Json& trace) {
                grouped(trace["hits"].get<std::uint64_t>()), rate["median"].get<double>(),
                rate["min"].get<double>(), rate["max"].get<double>(),
                per_ray("node_visits_per_ray", 1), per_ray("triangle_tests_per_ray", 2));
-    if (const auto invalid = trace["invalid_rays"].get<std::uint64_t>())
-        fmt::print("{} rays are invalid and count as misses\n", grouped(invalid));
+    print_invalid_rays(trace["invalid_rays"].get<std::uint64_t>());
 }
 
 Mode mode_of(const TraceCommand& options) {
@@ -451,7 +449,6 @@ void run_trace(const TraceCommand& given) {
     if (scene && options.explain) scene->explain(options.common);
     if (warps) explain_warps(options, input.bvh);
     if (through_kdtree && options.explain) explain_kdtree(*traced.kdtree, options.common);
-    Progress progress("tracing", options.common);
     if (options.rays.ends_with(".npy")) {
         const std::vector<Ray> rays = load_rays(options.rays);
         if (!rays.empty())
@@ -460,6 +457,7 @@ void run_trace(const TraceCommand& given) {
     } else {
         const std::vector<Camera> cameras =
             about(options.scene, [&] { return chosen_cameras(options.camera, input.scene); });
+        Progress progress("tracing", options.common);
         for (std::size_t c = 0; c < cameras.size(); ++c)
             about(options.scene, [&] {
                 trace_camera(options, input, cameras[c], ray_kind(options.rays), size, batch, tally,
@@ -472,6 +470,8 @@ void run_trace(const TraceCommand& given) {
     save_kept(options, mode, kept, scene ? scene->hit_fields() : HitFields::tree);
     Json document = new_document("trace");
     document["scene"] = scene ? scene->scene_json() : scene_json(input.scene);
+    tell_left_out(document, scene ? left_out_triangles(scene->scene()) : input.bvh.left_out(),
+                  options.common);
     document["load_ms"] = input.scene.load_ms;
     const std::vector<BuildMs> builds =
         is_rdx(options.scene) ? std::vector<BuildMs>{} : std::vector{input.bvh.build_ms()};
@@ -533,12 +533,9 @@ void add_trace_command(CLI::App& app) {
         ->check(CLI::IsMember(trace_kernel_names()));
     command->add_option("--machine", options->machine, "Simulated machine of --device sim")
         ->capture_default_str();
-    command->add_option("--camera", options->camera, "Number of a camera, or all")
-        ->capture_default_str();
-    command
-        ->add_option("--size", options->size_text,
-                     "Pixels of the cameras (default: of cameras.json, or 1024x768)")
-        ->type_name("WxH");
+    add_cameras_option(*command, options->camera);
+    add_size_option(*command, options->size_text,
+                    "Pixels of the cameras (default: of cameras.json, or 1024x768)");
     command->add_option("--samples", options->samples, "Secondary rays per primary hit")
         ->transform(whole_number(1, 1024))
         ->capture_default_str();
@@ -563,6 +560,7 @@ void add_trace_command(CLI::App& app) {
     add_result_limit(*command, options->max_result_bytes);
     add_wide_trace_options(*command, options->wide);
     add_tree_options(*command, options->tree);
+    add_tree_figure_options(*command, options->tree);
     add_flatten_option(*command, options->common);
     add_common_options(*command, options->common);
     command->callback([options, command] {

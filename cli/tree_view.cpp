@@ -54,6 +54,9 @@ void add_tree_view_options(CLI::App& command, TreeViewOptions& options) {
         command
             .add_option("--levels", options.levels,
                         "Levels to draw: FIRST-LAST or one (default: 0-7 for tree, all for slice)")
+            ->check([](const std::string& text) {
+                return text.empty() ? "'' is neither a level nor FIRST-LAST" : "";
+            })
             ->type_name("RANGE")
             ->group(group));
     options.given.push_back(

@@ -106,9 +106,7 @@ void WarpTracer::run_simulated(std::span<const Ray> rays, std::vector<Hit>& hits
         simulate(tree_, rays, {&simulate_, 1}, &found, settings_.threads);
     figures_.add(figures.front());
     set_hits(found.front(), hits);
-    // The simulator leaves invalid rays out without a word.
-    std::vector<Hit> unused(rays.size());
-    invalid_ += trace(Bvh(), rays, unused, {.threads = settings_.threads}).invalid_rays;
+    invalid_ += count_invalid_rays(rays, settings_.threads);
 }
 
 Json WarpTracer::simulated_json() const {
@@ -138,8 +136,7 @@ void print_warp_trace(const Json& trace) {
                    kernel["median"].get<double>(), kernel["min"].get<double>(),
                    kernel["max"].get<double>(), all["median"].get<double>());
     }
-    if (const auto invalid = trace["invalid_rays"].get<std::uint64_t>())
-        fmt::print("{} rays are invalid and count as misses\n", grouped(invalid));
+    print_invalid_rays(trace["invalid_rays"].get<std::uint64_t>());
 }
 
 }  // namespace raydix::cli

@@ -1,9 +1,11 @@
-// How the library writes files.
+// How the library writes files, and which ones it reads.
 #pragma once
 
 #include <cstddef>
 #include <filesystem>
 #include <span>
+#include <string>
+#include <vector>
 
 namespace raydix {
 
@@ -18,5 +20,10 @@ namespace raydix {
 /// Throws InputError that names the file and the system's reason. A pipe that nobody reads any more
 /// and a limit on the size of files are such reasons; they raise no signal.
 void write_file(const std::filesystem::path& file, std::span<const std::byte> bytes);
+
+/// The files that load_model reads for `spec`: the file itself, cameras.json beside it, and the
+/// buffers that a glTF document names. Files that are not there are named, too. None for a built-in
+/// scene. Throws InputError if `spec` is a glTF document that cannot be read.
+[[nodiscard]] std::vector<std::filesystem::path> files_of_model(const std::string& spec);
 
 }  // namespace raydix

@@ -56,6 +56,10 @@ struct RenderOptions {
     std::function<void(double)> progress;
 };
 
+/// Rays per pixel that gather light: `samples` as it is rounded, or what 0 stands for. 0 in views
+/// that gather none.
+[[nodiscard]] int light_samples(const RenderOptions& options);
+
 /// Renders the scene as its last commit left it. A geometry or instance without any bit in its mask
 /// is not seen. `shaded`, `ao`, `diffuse` and `path` gather light; a pixel of the other views has
 /// one ray, through its center. The picture does not depend on the number of threads. Throws

@@ -18,6 +18,7 @@
 #include <raydix/rdx_scene.h>      // IWYU pragma: export
 #include <raydix/result_limit.h>   // IWYU pragma: export
 #include <raydix/scene.h>          // IWYU pragma: export
+#include <raydix/scene_info.h>     // IWYU pragma: export
 #include <raydix/scene_pairs.h>    // IWYU pragma: export
 #include <raydix/scene_queries.h>  // IWYU pragma: export
 #include <raydix/shapes.h>         // IWYU pragma: export

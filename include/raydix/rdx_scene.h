@@ -59,6 +59,9 @@ using RdxSceneD = BasicRdxScene<double>;
 [[nodiscard]] RdxScene load_rdx_scene(const std::filesystem::path& file);
 [[nodiscard]] RdxSceneD load_rdx_scene_double(const std::filesystem::path& file);
 
+/// Whether it is a regular file that begins as .rdx files do, whatever its name. False for one that
+/// cannot be read.
+[[nodiscard]] bool is_rdx_file(const std::filesystem::path& file);
 /// Whether an .rdx file holds a scene (load_rdx_scene), not a tree (load_rdx). Reads its header
 /// alone. Throws InputError if it is no .rdx file.
 [[nodiscard]] bool holds_scene(const std::filesystem::path& file);

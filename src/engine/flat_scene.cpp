@@ -16,6 +16,7 @@
 #include "engine/merge.h"
 #include "engine/shape_tree.h"
 #include "exec/join_copies.h"
+#include "exec/parallel.h"
 #include "exec/result_memory.h"
 #include "primitives/double_sources.h"
 #include "primitives/sources.h"
@@ -230,6 +231,24 @@ FlatScene<Scalar> FlatPlan<Scalar>::flatten() const {
     if (!paths.ways.empty()) drop_what_meshes_leave_out<Scalar>(copies, out.own);
     out.mesh = out.own;
     return out;
+}
+
+template <class Scalar>
+void FlatPlan<Scalar>::for_each_mesh(
+    const std::function<void(const BasicMeshView<Scalar>&)>& visit) const {
+    FlatScene<Scalar> unused;
+    const Paths paths(*this, unused);
+    for (const FlatCopy<Scalar>& copy : paths.copies) {
+        if (copy.way == no_way) {
+            visit(copy.mesh);
+            continue;
+        }
+        std::vector<BasicVec3<Scalar>> moved(copy.mesh.vertices.size());
+        const auto move = copy.mover();
+        for_each_index(moved.size(),
+                       [&](std::size_t i) { moved[i] = move(copy.mesh.vertices[i]); });
+        visit({moved, copy.mesh.triangles});
+    }
 }
 
 template <class Scalar>

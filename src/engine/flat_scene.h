@@ -10,6 +10,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <type_traits>
 #include <unordered_map>
@@ -95,6 +96,9 @@ public:
     /// and are rounded once. Where a path mirrors, two corners change places. Meshes are by
     /// (instance, geometry). Throws InputError: 2^32 - 1 triangles or vertices, or more.
     [[nodiscard]] FlatScene<Scalar> flatten() const;
+    /// The same mesh by mesh, with all triangles as they are given: visit(mesh), in no more memory
+    /// than the vertices of one.
+    void for_each_mesh(const std::function<void(const BasicMeshView<Scalar>&)>& visit) const;
     /// Throws InputError: 2^31 triangles, or more.
     [[nodiscard]] FlatTree<Scalar> tree(int threads) const;
 

@@ -47,9 +47,7 @@ struct PixelRays {
 };
 
 PixelRays pixel_rays(const RenderOptions& options) {
-    if (!gathers_light(options.view)) return {1, 0};
-    const int asked = options.samples > 0 ? options.samples : default_samples(options.view);
-    const auto samples = static_cast<std::uint32_t>(asked);
+    const auto samples = static_cast<std::uint32_t>(light_samples(options));
     return {samples >= 4 ? 4u : 1u, samples};
 }
 
@@ -277,6 +275,12 @@ PrimarySamples trace_primary(const RenderScene& scene, std::span<const std::uint
         primary.points[k].sequence = i % scene.rays_per_pixel;
     }
     return primary;
+}
+
+int light_samples(const RenderOptions& options) {
+    if (!gathers_light(options.view)) return 0;
+    const int asked = options.samples > 0 ? options.samples : default_samples(options.view);
+    return asked >= 4 ? (asked + 3) / 4 * 4 : asked;
 }
 
 bool is_tone_mapped(View view) {

@@ -3,10 +3,13 @@
 #include <raydix/bvh.h>
 #include <raydix/camera.h>
 #include <raydix/error.h>
+#include <raydix/files.h>
 #include <raydix/model.h>
 #include <raydix/trace.h>
 
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "base/math.h"
 #include "exec/parallel.h"
@@ -50,9 +53,13 @@ Aabb finite_bounds(const Model& model) {
     return box;
 }
 
+std::filesystem::path cameras_beside(const std::filesystem::path& file) {
+    return file.parent_path() / "cameras.json";
+}
+
 /// Another program's file of this name is no reason not to give the geometry.
 void take_cameras_beside(const std::filesystem::path& file, Model& model) {
-    const std::filesystem::path beside = file.parent_path() / "cameras.json";
+    const std::filesystem::path beside = cameras_beside(file);
     std::error_code ignored;
     if (!std::filesystem::exists(beside, ignored)) return;
     try {
@@ -84,6 +91,13 @@ Model load_model(const std::string& spec, std::uint64_t seed) {
         scene.cameras.cameras.push_back(fit_camera(finite_bounds(scene)));
     scene.load_ms = watch.lap();
     return scene;
+}
+
+std::vector<std::filesystem::path> files_of_model(const std::string& spec) {
+    if (spec.starts_with(builtin_prefix)) return {};
+    std::vector<std::filesystem::path> files = files_of(spec);
+    files.push_back(cameras_beside(spec));
+    return files;
 }
 
 Model load_flat_model(const std::string& spec, std::uint64_t seed) {

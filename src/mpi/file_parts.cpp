@@ -2,6 +2,7 @@
 // n (r + 1) / R of all files, and of meshes the vertices that these use.
 #include <raydix/error.h>
 #include <raydix/mpi.h>
+#include <raydix/rdx_scene.h>
 
 #include <algorithm>
 #include <array>
@@ -181,7 +182,7 @@ std::optional<std::vector<Plan>> plans_of(const std::filesystem::path& file) {
     std::string ending = file.extension().string();
     for (char& c : ending) c = c >= 'A' && c <= 'Z' ? char(c - 'A' + 'a') : c;
     std::vector<Plan> plans;
-    if (ending == ".rdx") {
+    if (ending == ".rdx" || is_rdx_file(file)) {
         const auto places = rdx::mesh_places(file);
         if (!places) return {};
         for (const rdx::MeshPlace& place : *places) plans.push_back(plan_rdx(place));

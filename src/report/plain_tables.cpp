@@ -85,6 +85,28 @@ std::string rows_table(const std::string& title, const Json& list, Origin origin
     return table_html(table);
 }
 
+/// What tells a row from its neighbours.
+std::string name_of_row(const Json& row, std::size_t k) {
+    for (const Json& value : row)
+        if (value.is_string()) return shortened(value.get<std::string>(), 80);
+    return std::to_string(k + 1);
+}
+
+/// The table of a list, and those of lists within its rows. `shown`: tables so far.
+void append_rows(const std::string& title, const Json& list, Origin origin, std::size_t& shown,
+                 std::string& html) {
+    html += rows_table(title, list, origin);
+    ++shown;
+    for (std::size_t k = 0; k < list.size(); ++k) {
+        Flat fields;
+        flatten(list[k], "", deepest_shown - 1, fields);
+        for (const auto& [name, field] : fields)
+            if (is_rows(*field) && shown < most_tables)
+                append_rows(fmt::format("{}, {}: {}", title, name_of_row(list[k], k), name), *field,
+                            origin, shown, html);
+    }
+}
+
 }  // namespace
 
 std::string plain_tables(const std::string& title, const Json& value, Origin origin) {
@@ -102,8 +124,7 @@ std::string plain_tables(const std::string& title, const Json& value, Origin ori
     std::size_t shown = 0;
     for (const auto& [name, field] : fields) {
         if (is_rows(*field) && shown < most_tables) {
-            lists += rows_table(title + ": " + name, *field, origin);
-            ++shown;
+            append_rows(title + ": " + name, *field, origin, shown, lists);
         } else {
             table.rows.push_back({name, plain_cell(*field)});
         }

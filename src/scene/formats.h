@@ -6,7 +6,9 @@
 #include <raydix/mesh.h>
 #include <raydix/model.h>
 
+#include <filesystem>
 #include <functional>
+#include <vector>
 
 #include "scene/byte_source.h"
 
@@ -24,9 +26,13 @@ using OpenExternal = std::function<ByteSource(const std::filesystem::path& relat
 
 /// Takes .gltf and .glb alike; the first four bytes tell which. Without name and cameras.
 [[nodiscard]] Model load_gltf(ByteSource& in, const OpenExternal& open_external);
+/// The files that it would open.
+[[nodiscard]] std::vector<std::filesystem::path> gltf_external_files(ByteSource& in);
 
 /// A file by its extension. Without cameras; the name is made printable.
 [[nodiscard]] Model load_file(const std::filesystem::path& file);
+/// What load_file reads: the file, and what it names.
+[[nodiscard]] std::vector<std::filesystem::path> files_of(const std::filesystem::path& file);
 
 [[nodiscard]] CameraSet read_cameras(ByteSource& in);
 

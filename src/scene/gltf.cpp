@@ -285,4 +285,8 @@ Model load_gltf(ByteSource& in, const OpenExternal& open_external) {
     return SceneWalk(document).read();
 }
 
+std::vector<std::filesystem::path> gltf_external_files(ByteSource& in) {
+    return GltfDocument(in, {}).external_files();
+}
+
 }  // namespace raydix

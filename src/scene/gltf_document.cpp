@@ -247,6 +247,18 @@ std::string_view GltfDocument::buffer_bytes(std::uint64_t buffer) {
     return std::string_view(*bytes).substr(0, static_cast<std::size_t>(length));
 }
 
+std::vector<std::filesystem::path> GltfDocument::external_files() const {
+    std::vector<std::filesystem::path> files;
+    for (std::uint64_t i = 0; i < list_size("buffers"); ++i) {
+        const json& entry = item("buffers", i);
+        const auto uri = entry.find("uri");
+        if (uri == entry.end() || !uri->is_string()) continue;
+        const auto& text = uri->get_ref<const std::string&>();
+        if (!text.starts_with("data:")) files.emplace_back(percent_decoded(text));
+    }
+    return files;
+}
+
 std::string GltfDocument::decode_base64(std::uint64_t buffer, std::string_view text) const {
     while (text.ends_with('=')) text.remove_suffix(1);
     std::string bytes;

@@ -25,6 +25,9 @@ public:
     /// SCALAR of uint8, uint16 or uint32.
     [[nodiscard]] std::vector<std::uint32_t> indices(std::uint64_t accessor);
 
+    /// Of its buffers, relative to it.
+    [[nodiscard]] std::vector<std::filesystem::path> external_files() const;
+
     [[nodiscard]] const nlohmann::json& root() const { return root_; }
     [[nodiscard]] const ByteSource& source() const { return in_; }
     [[nodiscard]] std::uint64_t bytes() const {

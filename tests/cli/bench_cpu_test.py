@@ -45,6 +45,11 @@ class BenchCpu(ProgramTest):
     def ratios(self, scene):
         return {(r["raydix"], r["workload"], r["figure"]): r for r in scene["ratios"] if r["workload"]}
 
+    def test_usage_errors_come_before_the_work(self):
+        absent = "absent.ply"  # the work would fail with it
+        for options in (("--size", "0x0"), ("--camera", "foo"), ("--no-rays", "--size", "foo")):
+            self.fail_with_usage("bench", "cpu", absent, *options, names=options[-2:])
+
     def test_all_workloads(self):
         document = self.document("bench", "cpu", SCENE, *SMALL, "--no-builds", "--quality", "balanced", "--embree",
                                  "medium,medium+robust")

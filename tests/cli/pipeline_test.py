@@ -326,5 +326,20 @@ class Pipeline(ProgramTest):
             self.assertEqual((10 + struct.unpack_from("<H", content, 8)[0]) % 64, 0)
 
 
+class RenderDocument(ProgramTest):
+    def test_it_has_the_camera_and_samples_that_were_used(self):
+        scene, size = "builtin:soup?triangles=50", ("--size", "8x8", "-o", "p.png")
+        plain = self.document("render", scene, *size)["render"]
+        self.assertEqual((plain["camera"], plain["fov"], plain["samples"], plain["ao_radius"]), ("corner", 32, 16, None))
+        moved = self.document("render", scene, *size, "--eye", "1", "2", "3", "--target", "0", "0.5", "0", "--up", "0", "0", "1",
+                              "--fov", "30", "--samples", "5", "--view", "ao", "--ao-radius", "0.25")["render"]
+        self.assertEqual((moved["camera"], moved["eye"], moved["target"], moved["up"], moved["fov"]),
+                         (None, [1, 2, 3], [0, 0.5, 0], [0, 0, 1], 30))
+        self.assertEqual((moved["samples"], moved["ao_radius"]), (8, 0.25))
+        self.assertEqual(self.document("render", scene, *size, "--view", "depth")["render"]["samples"], 0)
+        self.assertGreater(self.document("render", scene, *size, "--view", "ao")["render"]["ao_radius"], 0)
+        self.assertIsNone(self.document("render", scene, *size, "--view", "slice")["render"]["eye"])
+
+
 if __name__ == "__main__":
     main()

@@ -55,6 +55,14 @@ class QueryMesh(ProgramTest):
             first = first or files
             self.assertEqual(files, first)
 
+    def test_the_text_says_whether_the_mesh_is_closed(self):
+        queries = self.queries([(0, 0, 1)])
+        for name, mesh, line in (("closed.ply", BOX, "solid        oriented, inside by crossings\n"),
+                                 ("open.ply", TRIANGLE, "solid        open (3 open edges), inside by winding number\n")):
+            for options in ((), ("--builder", "ploc")):
+                text = self.succeed("query", self.write(name, mesh), "--signed-distance", "--queries", queries, "--repeat", "0", *options).out
+                self.assertIn(line, text)
+
     def test_signed_distance(self):
         scene = self.write("box.ply", BOX)
         points = [(1, 1, 1), (1, 1, 3), (2, 2, 2), (3, 2, 2), (0.5, 1, 1), (math.inf, 0, 0)]

@@ -22,6 +22,15 @@ class Report(ProgramTest):
         self.succeed("report", *arguments, "-o", "page.html", "--quiet")
         return (self.folder / "page.html").read_text(encoding="utf-8")
 
+    def test_rows_within_rows_are_tables(self):
+        rows = [{"cloud": cloud, "queries": [{"kind": "knn", "rate": rate, "peers": [{"peer": f"peer of {cloud}", "rate": rate / 2}]}]}
+                for cloud, rate in (("even", 12.25), ("dense", 46.75))]
+        self.write("points.json", json.dumps({"command": "bench points", "clouds": rows}))
+        self.succeed("report", "points.json", "-o", "page.html", "--quiet")
+        page = (self.folder / "page.html").read_text().replace("<wbr>", "")
+        for text in ("clouds, even: queries", "12.25", "46.75", "queries, knn: peers", "peer of dense"):
+            self.assertIn(text, page)
+
     def test_documents_of_every_command(self):
         results = [self.make("build.json", "build", FIGURE), self.make("trace.json", "trace", FIGURE, "--size", "16x12"),
                    self.make("check.json", "check", FIGURE), self.make("info.json", "info", FIGURE),

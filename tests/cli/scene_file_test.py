@@ -49,7 +49,7 @@ class SceneFile(ProgramTest):
     def test_counts(self):
         self.succeed("build", self.scene, "--repeat", "1", "-o", "saved.rdx")
         scene = self.document("info", "saved.rdx")["scene"]
-        self.assertEqual((scene["geometries"], scene["instances"], scene["triangles"], scene["vertices"]), (3, 3, 6, 12))
+        self.assertEqual((scene["geometries"], scene["instances"], scene["triangles"], scene["vertices"]), (3, 3, 8, 16))
         self.assertEqual((scene["layout"], scene["quality"]), ("wide8", "balanced"))
         self.assertEqual(scene["bytes"], (self.folder / "saved.rdx").stat().st_size)
         self.assertIn("3 meshes", self.succeed("info", "saved.rdx").out)
@@ -96,6 +96,19 @@ class SceneFile(ProgramTest):
         self.fail_with_usage("trace", "TREE.RDX", "--builder", "karras", names=("--builder", "TREE.RDX"))
         self.succeed("build", "TREE.RDX", "--builder", "karras", "--repeat", "1")  # its triangles anew
         self.fail_with_one_line("info", self.write("x.txt", ""), names=("x.txt", ".glb", ".rdx"))
+
+    def test_other_names(self):
+        """What build -o wrote is known by how it begins."""
+        for scene, name in ((SOUP, "tree.txt"), (self.scene, "scene.ply"), (self.scene, "no_ending")):
+            with self.subTest(name=name):
+                self.succeed("build", scene, "--repeat", "1", "-o", name)
+                self.succeed("build", scene, "--repeat", "1", "-o", "same.rdx")
+                for command in (("info",), ("trace", "--size", "8x8", "--repeat", "1")):
+                    found, wanted = (self.document(command[0], file, *command[1:])["scene"] for file in (name, "same.rdx"))
+                    self.assertEqual(found, wanted)
+                self.succeed("check", name)
+                self.succeed("build", name, "--repeat", "1", "-o", name) if name == "tree.txt" else None
+        self.fail_with_usage("trace", "tree.txt", "--builder", "karras", names=("--builder", "tree.txt"))
 
     def test_altered_files(self):
         self.succeed("build", self.scene, "--repeat", "1", "-o", "saved.rdx")

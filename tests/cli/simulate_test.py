@@ -4,13 +4,14 @@ import json
 import os
 import pathlib
 import signal
+import struct
 import subprocess
 import sys
 import time
 import unittest
 
 sys.dont_write_bytecode = True
-from program import PROGRAM, SANITIZED, TRIANGLE, ProgramTest, main, ply  # noqa: E402
+from program import PROGRAM, SANITIZED, TRIANGLE, ProgramTest, main, ply, write_npy  # noqa: E402
 
 SCENE = "builtin:grove?triangles=10000" if SANITIZED else "builtin:grove?triangles=20000"
 SMALL = ("--size", "32x24", "--samples", "2") if SANITIZED else ("--size", "64x48", "--samples", "4")
@@ -92,6 +93,13 @@ class Simulate(ProgramTest):
         document = self.document("simulate", SCENE, "--rays", "rays.npy", "--width", "8")
         self.assertEqual({row["count"] for row in document["simulate"]}, {32 * 24})
         self.assertEqual({row["width"] for row in document["simulate"]}, {8})
+
+    def test_invalid_rays_are_counted(self):
+        rows = [(0, 0, 5, 0, 0, 0, -1, 9), (float("nan"), 0, 5, 0, 0, 0, -1, 9), (0, 0, 5, 0, 0, 0, 0, 9)]
+        write_npy(self.folder / "invalid.npy", "<f4", (3, 8), b"".join(struct.pack("<8f", *row) for row in rows))
+        arguments = ("simulate", SCENE, "--rays", "invalid.npy", "--kernel", "while_while,packet")
+        self.assertEqual([row["invalid_rays"] for row in self.document(*arguments)["simulate"]], [2, 2])
+        self.assertIn("\n2 rays are invalid and count as misses\n", self.succeed(*arguments).out)
 
     def test_machine_files(self):
         document = self.document("simulate", SCENE, *SMALL, "--rays", "primary", "--kernel", "while_while")

@@ -3,23 +3,24 @@ import json
 import os
 import pty
 import stat
+import struct
 import subprocess
 import sys
 import time
 
 sys.dont_write_bytecode = True
-from program import COMMANDS, PROGRAM, TIME_LIMIT_S, TRIANGLE, ProgramTest, json_of, main, ply  # noqa: E402
+from program import COMMANDS, PROGRAM, TIME_LIMIT_S, TRIANGLE, ProgramTest, json_of, main, ply, write_npy  # noqa: E402
 
 COMMON = ["--json", "--threads", "--quiet", "--seed"]
-TREE = ["--tree", "--builder", "--quality", "--bits", "--max-leaf", "--max-level", "--fit", "--layout", "--device", "--strict",
-        "--epo", "--cameras", "--sah-node", "--sah-primitive"]
+TREE = ["--tree", "--builder", "--quality", "--bits", "--max-leaf", "--max-level", "--fit", "--layout", "--device", "--strict", "--cameras"]
+FIGURES = ["--epo", "--sah-node", "--sah-primitive"]
 OPTIONS = {
     "info": ["SCENE"],
     "scenes": [],
-    "build": ["SCENE", "--repeat", "--output", *TREE],
+    "build": ["SCENE", "--repeat", "--output", *TREE, *FIGURES],
     "check": ["SCENE", "--same", *TREE],
     "trace": ["SCENE", "--rays", "--mode", "--kernel", "--camera", "--hits", "--save-rays", "--repeat", "--size",
-              "--samples", "--ao-radius", "--explain", *TREE],
+              "--samples", "--ao-radius", "--explain", *TREE, *FIGURES],
     "render": ["SCENE", "--output", "--view", "--size", "--camera", "--eye", "--target", "--up", "--fov",
                "--samples", *TREE],
     "query": ["SCENE", "--knn", "--radius", "--box", "--queries", "--out", "--sort", "--tree", "--strict", "--repeat"],
@@ -38,6 +39,12 @@ class Usage(ProgramTest):
                 self.assertIn(option, text, command)
             for line in text.splitlines():
                 self.assertFalse(line.strip().startswith("--") and len(line.split()) == 1, f"no words about {line}")
+
+    def test_figures_belong_to_commands_that_print_them(self):
+        for command in (("check", SMALL), ("render", SMALL, "-o", "x.png")):
+            for option in FIGURES:
+                self.assertNotIn(option, self.succeed(command[0], "--help").out)
+                self.fail_with_usage(*command, option, "1", names=[option])
 
     def test_version(self):
         self.assertRegex(self.succeed("--version").out, r"\Araydix \d+\.\d+\.\d+\n\Z")
@@ -95,6 +102,33 @@ class Usage(ProgramTest):
                                   (("query", "tri.ply", "--knn", "1"), "--queries"), (("bench", "traversal", "tri.ply"), "--state")):
             with self.subTest(option=option):
                 self.fail_with_usage(*arguments, option, "", names=[option, "the name of the file is empty"])
+
+    def test_faults_are_named_as_they_were_typed(self):
+        self.fail_with_usage("--nope", names=["'--nope' is not an option of raydix"])
+        self.fail_with_usage("bench", "--nope=3", names=["'--nope' is not an option of bench"])
+        self.fail_with_usage("trace", SMALL, "--siz", "8x8", names=["not expected: --siz 8x8"])
+        for option, names in (("--kernel", "packet,while_while,packet"), ("--rays", "primary,ao,primary")):
+            self.fail_with_usage("simulate", SMALL, option, names, names=[option, names.split(",")[0], "twice"])
+        self.fail_with_usage("man", "--folder", "", names=["--folder", "empty"])
+        self.fail_with_usage("render", SMALL, "-o", "x.png", "--view", "tree", "--levels", "", names=["--levels"])
+        result = self.write("empty.json", "{}")
+        self.fail_with_usage("report", result, "-o", "t.png", names=["--output", "t.png", ".html"])
+        for tree in ("octree", "kdtree"):
+            self.assertIn(" bytes a triangle)", self.succeed("build", SMALL, "--tree", tree, "--repeat", "1").out)
+
+    def test_sizes_and_cameras_are_looked_at_before_the_work(self):
+        for command in (("trace", "absent.ply"), ("simulate", "absent.ply"), ("render", "absent.ply", "-o", "x.png"),
+                        ("report", "absent.json", "-o", "x.html"), ("bench", "traversal", "absent.ply")):
+            self.fail_with_usage(*command, "--size", "foo", names=["--size", "'foo'"])
+            if command[0] != "report":
+                self.fail_with_usage(*command, "--camera", "foo", names=["--camera", "'foo'"])
+
+    def test_numbers_that_float32_does_not_hold(self):
+        for command in (("trace", SMALL), ("render", SMALL, "-o", "x.png"), ("simulate", SMALL)):
+            for bad in ("1e-300", "1e300"):
+                self.fail_with_usage(*command, "--ao-radius", bad, names=["--ao-radius", f"'{bad}'", "float32"])
+        self.fail_with_usage("query", SMALL, "--radius", "1e39", names=["--radius", "float32"])
+        self.succeed("query", SMALL, "--radius", "1e-300", "--repeat", "0")  # it may be 0
 
     def test_whole_numbers(self):
         for command, option, most in (("build", "--seed", 2**64 - 1), ("trace", "--max-result-bytes", 2**64 - 1),
@@ -256,7 +290,10 @@ class Usage(ProgramTest):
         points = self.write("points.ply", ply([(0, 0, 0), (1, 0, 0)]))
         self.fail_with_one_line("trace", points, names=["points.ply", "points"])
         self.fail_with_one_line("build", points, "--layout", "compact", "--quiet", names=["points.ply", "rays need triangles"])
-        self.fail_with_one_line("render", points, "-o", "x.png", names=["points.ply", "points"])
+        for options in ((), ("--builder", "ploc")):
+            self.fail_with_one_line("render", points, "-o", "x.png", *options, names=["points.ply", "points", "--view tree", "--view slice"])
+        for view in ("tree", "slice"):
+            self.succeed("render", points, "-o", "x.png", "--size", "8x8", "--view", view)
 
     def test_odd_file_names(self):
         for name in (b"caf\xe9.ply", "gr\u00fcn \u6728.ply".encode(), b"two\nlines.ply", b"-dash.ply", b"\x1b[31m.ply"):
@@ -288,6 +325,38 @@ class Usage(ProgramTest):
         self.succeed("build", "again.rdx", "-o", "again.rdx")  # a tree may be built anew in its place
         self.succeed("check", "again.rdx")
         self.succeed(*rays, "--hits", "/dev/null", "--json", "/dev/null", "--quiet")
+
+    def test_files_that_a_name_stands_for_are_not_replaced(self):
+        (self.folder / "implied").mkdir()
+        camera = {"name": "c", "position": [0, 0, 3], "target": [0, 0, 0], "up": [0, 1, 0], "vfov": 40}
+        mesh = self.write("implied/mesh.ply", TRIANGLE)
+        gltf = self.write("implied/s.gltf", json.dumps({
+            "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+            "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+            "bufferViews": [{"buffer": 0, "byteLength": 36}], "buffers": [{"byteLength": 36, "uri": "a%20b.bin"}]}))
+        buffer = self.write("implied/a b.bin", struct.pack("<9f", 0, 0, 0, 1, 0, 0, 0, 1, 0))
+        cameras = self.write("implied/cameras.json", json.dumps([camera]))
+        queries = str(self.folder / "implied/w.distances.npy")
+        write_npy(queries, "<f4", (1, 3), struct.pack("<3f", 0, 0, 0))
+        before = {file.name: file.read_bytes() for file in (self.folder / "implied").iterdir()}
+        trace = ["--size", "4x4", "--repeat", "1"]
+        out = str(self.folder / "implied/w")
+        for arguments, names in ((["trace", mesh, *trace, "--json", cameras], ["cameras.json", "SCENE"]),
+                                 (["trace", gltf, *trace, "--hits", buffer], ["--hits", "a b.bin", "SCENE"]),
+                                 (["query", mesh, "--pairs", "--with", gltf, "--json", buffer], ["--json", "--with"]),
+                                 (["build", gltf, "-o", buffer], ["--output", "SCENE"]),
+                                 (["build", mesh, "-o", mesh], ["--output", "SCENE"]),
+                                 (["query", mesh, "--knn", "1", "--queries", queries, "--out", out], ["--out", "--queries"]),
+                                 (["query", mesh, "--knn", "1", "--out", out, "--json", out + ".indices.npy"], ["--json", "--out"]),
+                                 (["trace", mesh, *trace, "--mode", "all", "--hits", out + ".npy", "--save-rays", out + ".offsets.npy"],
+                                  ["--hits", "--save-rays"]),
+                                 (["check", "--same", mesh, gltf, "--json", mesh], ["--json", "--same"])):
+            with self.subTest(arguments[0], names=names):
+                self.fail_with_usage(*arguments, names=names)
+        self.assertEqual(before, {file.name: file.read_bytes() for file in (self.folder / "implied").iterdir()})
+        self.succeed("trace", mesh, *trace, "--hits", out + ".npy", "--save-rays", out + ".offsets.npy")  # no --mode all
+        self.succeed("trace", gltf, *trace, "--json", out + ".json")
 
     def test_quiet_prints_nothing(self):
         file = self.write("quiet.ply", TRIANGLE)
@@ -321,13 +390,15 @@ class Usage(ProgramTest):
                 break
             samples *= 2
         shown = self.on_terminal(*command, "--samples", str(samples))
+        both = self.on_terminal(*command, "--samples", str(samples), with_tables=True)
+        self.assertRegex(both, rb" %\r\x1b\[Kp\.png \(1600 x 1200", "the bar is not wiped before the result")
         self.assertRegex(shown, rb"\rrendering \[#*\.*\] +\d+ %")
         self.assertTrue(shown.rstrip().endswith(b"\r\x1b[K"), "the bar is not wiped at the end")
         self.assertEqual(self.on_terminal(*command, "--samples", str(samples), "--quiet"), b"")
 
-    def on_terminal(self, *arguments):
+    def on_terminal(self, *arguments, with_tables=False):
         ours, theirs = pty.openpty()
-        process = subprocess.Popen([PROGRAM, *arguments], stdout=subprocess.DEVNULL, stderr=theirs, cwd=self.folder)
+        process = subprocess.Popen([PROGRAM, *arguments], stdout=theirs if with_tables else subprocess.DEVNULL, stderr=theirs, cwd=self.folder)
         os.close(theirs)
         shown = b""
         try:

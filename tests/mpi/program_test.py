@@ -90,6 +90,40 @@ class Answers(Mpi):
                 self.assertGreater(document["report"]["rounds"], 0)
                 self.assertGreater(document["report"]["messages"]["sum"], 0)
 
+    def test_documents_name_the_scene_as_those_of_one_process(self):
+        alone = json.loads(subprocess.run([PROGRAM, "info", self.scene(), "--json", "-"], capture_output=True).stdout)["scene"]
+        far = self.folder / "far.obj"
+        far.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 2e12 0 0\nf 1 2 3\nf 1 2 4\n")
+        size = ("--size", "8x8")
+        for arguments in (("info",), ("trace", *size), ("query", "--closest"), ("render", *size, "-o", str(self.folder / "s.png")),
+                          ("render", *size, "-o", str(self.folder / "s.png"), "--distributed")):
+            with self.subTest(arguments):
+                document = self.document_of(2, arguments[0], self.scene(), *arguments[1:])
+                for field in ("name", "triangles", "points", "vertices", "left_out"):
+                    self.assertEqual(document["scene"][field], alone[field], field)
+                self.assertGreater(document["load_ms"], 0)
+                self.assertEqual(self.document_of(2, arguments[0], str(far), *arguments[1:])["scene"]["left_out"], 1)
+                self.assertIn("1 triangle left out", self.run_on(2, arguments[0], str(far), *arguments[1:]).stdout)
+        document = self.document_of(2, "info", self.scene(), self.scene())
+        self.assertEqual((document["scene"]["name"], document["scene"]["triangles"]), ("solid.obj, solid.obj", 2 * alone["triangles"]))
+
+    def test_what_is_invalid_is_counted_over_all_ranks(self):
+        queries, rays = self.folder / "invalid_queries.npy", self.folder / "invalid_rays.npy"
+        nan, down = float("nan"), (0, 0, 0, -1, 9)  # tmin, direction, tmax
+        for file, rows in ((queries, [(0, 0, 0), (nan, 0, 0), (1, nan, 0), (1, 1, 1), (nan, nan, nan)]),
+                           (rays, [(0.5, 0.5, 5, *down), (nan, 0, 5, *down), (0.5, 0.4, 5, *down)])):
+            head = f"{{'descr': '<f4', 'fortran_order': False, 'shape': ({len(rows)}, {len(rows[0])}), }}".ljust(117) + "\n"
+            file.write_bytes(b"\x93NUMPY\x01\x00" + struct.pack("<H", len(head)) + head.encode()
+                             + b"".join(struct.pack(f"<{len(row)}f", *row) for row in rows))
+        for kind in (("--knn", "2"), ("--radius", "0.1"), ("--closest",), ("--contains",)):
+            arguments = ("query", self.scene(), "--queries", str(queries), *kind)
+            document = self.document_of(2, *arguments)
+            self.assertEqual((document["queries"], document["invalid_queries"]), (5, 3), kind)
+            self.assertIn(" found, 3 invalid\n", self.run_on(2, *arguments).stdout)
+        arguments = ("trace", self.scene(), "--rays", str(rays))
+        self.assertEqual(self.document_of(2, *arguments)["invalid_rays"], 1)
+        self.assertIn("\n1 rays are invalid and count as misses\n", self.run_on(2, *arguments).stdout)
+
     def test_says_who_reads_and_who_holds_what(self):
         done = self.run_on(3, "info", self.scene())
         self.assertEqual(done.returncode, 0, done.stderr)
