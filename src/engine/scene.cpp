@@ -364,8 +364,7 @@ std::uint32_t BasicScene<Scalar>::add(const BasicScene& scene, const Transform& 
                                       const GeometryOptions& options) {
     const std::uint32_t id = new_id(*state_, options.id);
     // A scene that only its handle has stands in no other one.
-    if (scene.state_ == state_ ||
-        (state_.use_count() > 1 && scene.state_->holds(state_.get())))
+    if (scene.state_ == state_ || (state_.use_count() > 1 && scene.state_->holds(state_.get())))
         throw InputError("instance " + std::to_string(id) + ": the scene would hold itself");
     typename State::Geometry geometry;
     geometry.mask = options.mask;
