@@ -186,7 +186,7 @@ enum class QueryOrder : std::uint32_t {
 
 struct PointQueryOptions {
     int threads = 0;    // 0 to 1,024; 0: all the machine has
-    bool sort = false;  // true: rows by (distance, index). false: by index
+    bool sort = false;  // true: rows by (d2, index). false: by index
     QueryOrder order = QueryOrder::automatic;
     /// The most bytes that a call may hold which makes room for its result. 0: half of what is left
     /// to the process (result_limit.h).

@@ -130,7 +130,7 @@ class Points:
         max_result_bytes: int = 0,
         threads: int | None = None,
     ) -> dict[str, np.ndarray]:
-        """The k nearest points of each query, nearest first; equal distances by index.
+        """The k nearest points of each query, nearest first; equal squared distances by index.
 
         `queries`: shape (..., D). `k`: any number of 1 or more. Points farther than `max_distance`
         do not count, as `radius` has it, which saves the search for them. Returns "indices"
@@ -172,7 +172,8 @@ class Points:
         decide: see the class).
 
         `queries`: shape (..., D). `r`: a number, or one for each query (their leading shape); 0
-        finds equal points, infinity all. Rows ascend by index, with `sort` by (distance, index).
+        finds equal points, infinity all. Rows ascend by index, with `sort` by (squared distance,
+        index).
         Returns a dict: "offsets" (uint64, one more than queries), "indices" (uint32), "distances":
         row i, counted in C order, is offsets[i] to offsets[i + 1]. With `padded`: "counts" (...),
         "indices" and "distances" (..., longest row), filled up with 0xFFFFFFFF and infinity.
