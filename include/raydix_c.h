@@ -274,7 +274,8 @@ RAYDIX_C_API raydix_status raydix_closest_points(const raydix_scene* scene, cons
 
 /* All meshes of a scene's last commit as one body. */
 typedef struct raydix_solid raydix_solid;
-/* Refers to nothing of the scene. A scene with spheres or capsules is an error. */
+/* Refers to nothing of the scene. A scene with spheres, capsules, points or geometry of the
+   caller's own is an error. */
 RAYDIX_C_API raydix_status raydix_solid_create(const raydix_scene* scene, raydix_solid** solid);
 RAYDIX_C_API void raydix_solid_destroy(raydix_solid* solid);
 /* 1: every edge belongs to an even number of triangles. Then inside is exact. */

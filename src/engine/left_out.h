@@ -9,6 +9,7 @@
 #include <span>
 #include <string>
 
+#include "base/options.h"
 #include "primitives/double_sources.h"
 #include "primitives/sources.h"
 
@@ -33,7 +34,7 @@ void refuse_left_out(std::uint32_t geometry, const char* kind, const Source& sou
         if (source.box(i, box)) continue;
         throw InputError("geometry " + std::to_string(geometry) + ": " + kind + ' ' +
                          std::to_string(i) + ": not finite, out of range or inverted" +
-                         (count > 1 ? ", as are " + std::to_string(count - 1) + " others" : ""));
+                         others_too(count));
     }
 }
 

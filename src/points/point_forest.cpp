@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "base/check.h"
+#include "base/options.h"
 #include "exec/parallel.h"
 #include "points/build_tree.h"
 #include "sort/radix_sort.h"
@@ -45,7 +46,7 @@ void PointForest<T, Dim>::insert(std::span<const Point> points) {
         const auto bounds = bounds_of_points<T, Dim>(reinterpret_cast<const T*>(points.data()), n);
         if (bounds.left_out != 0)
             throw InputError("point " + std::to_string(bounds.first_left_out) +
-                             ": not finite or out of range");
+                             ": not finite or out of range" + others_too(bounds.left_out));
     }
     begin();
     const std::size_t level = levels_that_stay(n);
