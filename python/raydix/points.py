@@ -201,7 +201,13 @@ class Points:
         if not is_numbers or (radii.ndim and radii.shape != lead):
             error = ValueError if is_numbers else TypeError
             raise error(f"r: expected a number or shape {lead}, given {describe(radii)}")
-        return cast(radii, self.dtype).reshape(-1)
+        radii = cast(radii, self.dtype)
+        if radii.ndim and not (radii >= 0).all():  # before batches are cut: of all, the first
+            first = np.flatnonzero(~(radii.reshape(-1) >= 0))[0]
+            raise _core.InputError(
+                f"radius {first} is {radii.reshape(-1)[first]:g}; it must be 0 or more"
+            )
+        return radii.reshape(-1)
 
     def count(self, queries: ArrayLike, r: float, *, threads: int | None = None) -> np.ndarray:
         """How many points lie within the distance `r` of each query: uint32, with the leading shape
