@@ -99,7 +99,7 @@ struct Holding {
 };
 
 struct QueryOptions {
-    bool sort = false;  // true: rows by (distance, number). false: by number
+    bool sort = false;  // true: rows by (squared distance, number). false: by number
     /// The most bytes that the result may take on this rank. 0: half of what is left to the process
     /// (result_limit.h).
     std::uint64_t max_result_bytes = 0;

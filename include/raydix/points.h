@@ -186,7 +186,7 @@ enum class QueryOrder : std::uint32_t {
 
 struct PointQueryOptions {
     int threads = 0;    // 0 to 1,024; 0: all the machine has
-    bool sort = false;  // true: rows by (distance, index). false: by index
+    bool sort = false;  // true: rows by (d2, index). false: by index
     QueryOrder order = QueryOrder::automatic;
     /// The most bytes that a call may hold which makes room for its result. 0: half of what is left
     /// to the process (result_limit.h).
@@ -241,10 +241,11 @@ template <class Index>
                                                         std::uint32_t k,
                                                         const PointQueryOptions& options = {});
 /// One query: indices and distances [k] for any k > 0. Nothing is allocated. Returns how many were
-/// found.
+/// found. `max_distance` as in PointQueryOptions.
 template <class Index>
 std::uint32_t knn(const Index& index, const typename Index::Point& query,
-                  std::span<std::uint32_t> indices, ScalarsOf<Index> distances);
+                  std::span<std::uint32_t> indices, ScalarsOf<Index> distances,
+                  double max_distance = std::numeric_limits<double>::infinity());
 
 /// Finds all points with d2 <= R*R. A radius of 0 finds points at the same place, infinity all.
 /// Throws InputError if a radius is negative or NaN (it is named). Throws ResultTooLarge, an

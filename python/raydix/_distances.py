@@ -13,7 +13,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ._arrays import number
+from ._arrays import MISSING, number
 from ._core import InputError
 from .points import Points
 
@@ -168,10 +168,10 @@ class Neighbourhood:
         return np.divmod(pairs, self.size)
 
     def nearest(
-        self, queries: np.ndarray, k: int, p: float, threads: int
+        self, queries: np.ndarray, k: int, p: float, threads: int, most: float = np.inf
     ) -> tuple[np.ndarray, np.ndarray]:
         """(measures, indices), both (Q, k): the k nearest by (measure, index). Where there are
-        fewer, infinity and n."""
+        fewer within the distance `most`, infinity and n."""
         measures = np.full((len(queries), k), np.inf)
         indices = np.full((len(queries), k), self.size, np.intp)
         if self.size == 0 or len(queries) == 0:
@@ -180,7 +180,7 @@ class Neighbourhood:
         wanted = asked = min(k, self.size)
         pending = np.arange(len(queries))
         while len(pending):
-            limits, enough = self._enough(queries[pending], wanted, asked, p, threads)
+            limits, enough = self._enough(queries[pending], wanted, asked, p, threads, most)
             done = pending[enough]
             for rows, found, at in self.within(queries[done], limits[enough], p, threads):
                 order = np.lexsort((found, at, rows))
@@ -194,19 +194,26 @@ class Neighbourhood:
         return measures, indices
 
     def _enough(
-        self, queries: np.ndarray, wanted: int, asked: int, p: float, threads: int
+        self, queries: np.ndarray, wanted: int, asked: int, p: float, threads: int, most: float
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Limits within which each query has `wanted` points, from those that are nearest along
-        `axes`; and whether a search within them is worth its while: with more than three axes the
-        limits of few points are wide."""
+        """Limits within which each query has `wanted` points or all within the distance `most`,
+        from those that are nearest along `axes`; and whether a search within them is worth its
+        while: with more than three axes the limits of few points are wide."""
         limits = np.empty(len(queries))
         enough = np.ones(len(queries), bool)
+        bound = measure_of(most, p)
+        reach = float(self._reach(bound, p))
         step = max(1, CANDIDATES // (asked * queries.shape[1]))
         for begin in range(0, len(queries), step):
             some = slice(begin, begin + step)
-            near = self.points.knn(self.along_axes(queries[some]), asked, threads=threads)
-            at = self._measures(queries[some, None], near["indices"].astype(np.intp), p)
-            limits[some] = np.partition(at, wanted - 1, axis=1)[:, wanted - 1] * (1 + MARGIN)
+            near = self.points.knn(
+                self.along_axes(queries[some]), asked, max_distance=reach, threads=threads
+            )
+            found = np.minimum(near["indices"], self.size - 1).astype(np.intp)
+            at = self._measures(queries[some, None], found, p)
+            at[near["indices"] == MISSING] = np.inf
+            last = np.partition(at, wanted - 1, axis=1)[:, wanted - 1]
+            limits[some] = np.minimum(last * (1 + MARGIN), bound)
             if queries.shape[1] > 3 and asked < self.size:
                 enough[some] = self._reach(limits[some], p) <= 1.3 * near["distances"][:, -1]
         return limits, enough

@@ -130,7 +130,7 @@ class Points:
         max_result_bytes: int = 0,
         threads: int | None = None,
     ) -> dict[str, np.ndarray]:
-        """The k nearest points of each query, nearest first; equal distances by index.
+        """The k nearest points of each query, nearest first; equal squared distances by index.
 
         `queries`: shape (..., D). `k`: any number of 1 or more. Points farther than `max_distance`
         do not count, as `radius` has it, which saves the search for them. Returns "indices"
@@ -172,7 +172,8 @@ class Points:
         decide: see the class).
 
         `queries`: shape (..., D). `r`: a number, or one for each query (their leading shape); 0
-        finds equal points, infinity all. Rows ascend by index, with `sort` by (distance, index).
+        finds equal points, infinity all. Rows ascend by index, with `sort` by (squared distance,
+        index).
         Returns a dict: "offsets" (uint64, one more than queries), "indices" (uint32), "distances":
         row i, counted in C order, is offsets[i] to offsets[i + 1]. With `padded`: "counts" (...),
         "indices" and "distances" (..., longest row), filled up with 0xFFFFFFFF and infinity.
@@ -200,7 +201,13 @@ class Points:
         if not is_numbers or (radii.ndim and radii.shape != lead):
             error = ValueError if is_numbers else TypeError
             raise error(f"r: expected a number or shape {lead}, given {describe(radii)}")
-        return cast(radii, self.dtype).reshape(-1)
+        radii = cast(radii, self.dtype)
+        if radii.ndim and not (radii >= 0).all():  # before batches are cut: of all, the first
+            first = np.flatnonzero(~(radii.reshape(-1) >= 0))[0]
+            raise _core.InputError(
+                f"radius {first} is {radii.reshape(-1)[first]:g}; it must be 0 or more"
+            )
+        return radii.reshape(-1)
 
     def count(self, queries: ArrayLike, r: float, *, threads: int | None = None) -> np.ndarray:
         """How many points lie within the distance `r` of each query: uint32, with the leading shape

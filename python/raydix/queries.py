@@ -89,9 +89,8 @@ class SceneQueries:
 
         `rule`: "crossings" (signed crossings to infinity are not 0), "parity" (their number is
         odd), "winding" (generalized winding number of 1/2 or more, Jacobson et al. 2013: for meshes
-        with holes; parts far away count by a series, Barill et al. 2018, with errors below 0.01,
-        which differ between builders and qualities), or "automatic": the first of these that the
-        mesh is closed enough for. The first two are decided without rounding, at edges and vertices
+        with holes; parts far away count by a series, see `winding_number`), or "automatic": the
+        first of these that the mesh is closed enough for. The first two are decided without rounding, at edges and vertices
         too, and points of the surface are inside. Points with NaN or infinity are outside.
         """
         asked, lead = rows(points, "points", (3,), self.dtype)
@@ -101,8 +100,11 @@ class SceneQueries:
 
     def winding_number(self, points: ArrayLike, *, rule: str = "automatic") -> np.ndarray:
         """The number that `contains` decides by: float64, with the leading shape; NaN for points
-        with NaN or infinity. With "winding" it has an error below 0.01, which differs between
-        builders and qualities."""
+        with NaN or infinity.
+
+        With "winding" parts far away count by two terms of a series (Barill et al. 2018). The error
+        differs between builders and qualities. It is below 0.01 for surfaces that do not overlap,
+        as far as tests go. Layers that lie on each other add theirs up: 0.27 for 40 of them."""
         asked, lead = rows(points, "points", (3,), self.dtype)
         numbers = np.empty(lead, FLOAT64)
         self._core.winding(asked, numbers.reshape(-1), _rule(rule), self.threads)

@@ -2,14 +2,15 @@
 
     from raydix.scipy import cKDTree
 
-Float64, as there. Answers are exact, whatever `eps`. Of two neighbours at the same distance the one
-with the lower index comes first; SciPy promises no order. Coordinates go to 1e12. The nodes of the
+Float64, as there. Answers are exact, whatever `eps`. Of two neighbours at the same distance (with
+p = 2 the same square of it) the one with the lower index comes first; SciPy promises no order. Coordinates go to 1e12. The nodes of the
 tree (`tree`) cannot be had.
 
 Euclidean distances in one, two or three dimensions take the short way: the index answers. With
 another `p`, a `boxsize` or more dimensions the index names candidates, and NumPy then measures
-them. In three dimensions that takes up to twice SciPy's time. With four or more use SciPy's own
-class: the index knows three axes, those along which the data is widest.
+them. In three dimensions the nearest then take 1 to 13 times as long as SciPy's, most where many
+are asked of clustered points. With four or more use SciPy's own class: the index knows three axes,
+those along which the data is widest.
 """
 
 from __future__ import annotations
@@ -198,15 +199,15 @@ class cKDTree:  # noqa: N801, the name of the class that it stands in for
     ) -> tuple[np.ndarray, np.ndarray]:
         """Those beyond `bound` may be left out."""
         near = self._near
+        most = bound * (1 + 1e-6) if bound >= 0 else np.inf
         if near.plain(p):
-            most = bound * (1 + 1e-6) if bound >= 0 else np.inf
             found = near.points.knn(
                 near.along_axes(queries), k, max_distance=most, threads=threads
             )
             indices = found["indices"].astype(np.intp)
             indices[found["indices"] == MISSING] = self.n
             return found["distances"], indices
-        measures, indices = near.nearest(queries.reshape(-1, self.m), k, p, threads)
+        measures, indices = near.nearest(queries.reshape(-1, self.m), k, p, threads, most)
         shape = queries.shape[:-1] + (k,)
         return distance_of(measures, p).reshape(shape), indices.reshape(shape)
 

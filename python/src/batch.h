@@ -31,14 +31,16 @@ inline void hear_signals() {
 }
 
 /// Calls body(begin, end) for pieces of [0, n) in order, without the interpreter's lock. Called
-/// with it. The first has `first` queries; the others more or fewer, by how long it took.
+/// with it. The first has `first` queries; the others more or fewer, by how long it took. No
+/// queries are one piece: what is wrong besides them is told.
 template <class Body>
 void in_pieces(std::size_t n, const Body& body, std::size_t first = piece_size) {
     using Clock = std::chrono::steady_clock;
     constexpr auto short_time = std::chrono::milliseconds(20), long_time = 5 * short_time;
     constexpr std::size_t smallest = 1024;
     std::size_t size = first;
-    for (std::size_t begin = 0; begin < n;) {
+    std::size_t begin = 0;
+    do {
         if (begin != 0) hear_signals();
         const std::size_t end = std::min(n, begin + size);
         const nanobind::gil_scoped_release unlocked;
@@ -50,7 +52,7 @@ void in_pieces(std::size_t n, const Body& body, std::size_t first = piece_size) 
         else if (time > long_time)
             size = std::max(size / 4, smallest);
         begin = end;
-    }
+    } while (begin < n);
 }
 
 /// What to ask the library for: all threads of the machine, unless this process is a fork of one

@@ -88,8 +88,8 @@ struct PointCalls {
             const std::size_t first = begin * k, length = (end - begin) * k;
             const std::span ids(indices.data() + first, length);
             const std::span far(distances.data() + first, length);
-            if (asked.size() == 1 && max_distance == infinity) {  // here, without set-up
-                counts.first += knn(index, asked[0], ids, far);
+            if (asked.size() == 1) {  // here, without set-up
+                counts.first += knn(index, asked[0], ids, far, max_distance);
                 return;
             }
             const QueryCounts met = knn(index, asked.subspan(begin, end - begin),

@@ -68,6 +68,11 @@ bool is_valid(const RayType& ray) {
            std::max(ray.tmin, decltype(ray.tmin){0}) <= ray.tmax && !std::isnan(ray.tmin);
 }
 
+/// No rays go the way of batches, which tells what is wrong besides them.
+bool are_few(std::size_t rays, const RayOptions& options) {
+    return rays != 0 && rays <= few_rays && options.filter == nullptr;
+}
+
 /// Of rays [begin, end).
 RayOptions piece_of(const RayOptions& options, std::size_t begin, std::size_t end) {
     RayOptions piece = options;
@@ -98,7 +103,7 @@ Counts intersect(Scene& scene, Rays& rays, const HitRows<Scene>& out, const RayO
     Counts counts{0, 0};
     read_in_pieces(scene, rays.size(), [&](std::size_t begin, std::size_t end) {
         const auto piece = rays.piece(begin, end);
-        if (rays.size() <= few_rays && options.filter == nullptr) {
+        if (are_few(rays.size(), options)) {
             for (std::size_t i = 0; i < piece.size(); ++i) {
                 hits[i] = scene.closest_hit(piece[i], mask_of(options, i));
                 counts.first += hits[i].hit();
@@ -121,7 +126,7 @@ Counts occluded(Scene& scene, Rays& rays, const FlagsOut& out, const RayOptions&
     Counts counts{0, 0};
     read_in_pieces(scene, rays.size(), [&](std::size_t begin, std::size_t end) {
         const auto piece = rays.piece(begin, end);
-        if (rays.size() <= few_rays && options.filter == nullptr) {
+        if (are_few(rays.size(), options)) {
             for (std::size_t i = 0; i < piece.size(); ++i) {
                 flags[i] = scene.any_hit(piece[i], mask_of(options, i));
                 counts.first += flags[i];

@@ -59,8 +59,10 @@ void require_all_valid(const std::string& name, const MeshView& mesh, int) {
         (left_out(middle) == 0 ? none : some) = middle;
     }
     throw InputError(name + ": triangle " + std::to_string(none) +
-                     " is not finite or out of range, as are " + std::to_string(all - 1) +
-                     " others");
+                     " is not finite or out of range" +
+                     (all == 1   ? ""
+                      : all == 2 ? ", as is 1 other"
+                                 : ", as are " + std::to_string(all - 1) + " others"));
 }
 
 /// The same: the library counts them in double only where it builds.

@@ -29,6 +29,13 @@ std::string number_text(Scalar value) {
     return {digits, std::to_chars(digits, digits + sizeof digits, value).ptr};
 }
 
+/// The end of a message that names the first of `faulty` elements.
+inline std::string others_too(std::uint64_t faulty) {
+    return faulty < 2    ? ""
+           : faulty == 2 ? ", as is 1 other"
+                         : ", as are " + std::to_string(faulty - 1) + " others";
+}
+
 /// Throws InputError unless `value` is at least 0. `what`: its name.
 template <class Scalar>
 void check_not_negative(std::string_view what, Scalar value) {

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "base/options.h"
 #include "build/bvh_builder_double.h"
 #include "build/bvh_builder_internals.h"
 #include "build/refit_checks.h"
@@ -101,8 +102,7 @@ void require_triangles_that_fit(const MeshViewD& mesh, const BoundsD& bounds, bo
     }
     if (strict && bounds.left_out != 0)
         throw InputError("triangle " + std::to_string(bounds.first_left_out) +
-                         ": not finite or out of range, as are " +
-                         std::to_string(bounds.left_out - 1) + " others");
+                         ": not finite or out of range" + others_too(bounds.left_out));
 }
 
 void copy_corners(const BvhDInternals& tree, const TriangleSourceD& source) {

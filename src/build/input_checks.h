@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <string>
 
+#include "base/options.h"
 #include "primitives/bounds.h"
 
 namespace raydix {
@@ -24,8 +25,7 @@ void check_bounds(const Bounds& bounds, const Source& source, const char* kind, 
     }
     if (strict && bounds.left_out != 0)
         throw InputError(std::string(kind) + " " + std::to_string(bounds.first_left_out) +
-                         ": not finite, out of range or inverted, as are " +
-                         std::to_string(bounds.left_out - 1) + " others");
+                         ": not finite, out of range or inverted" + others_too(bounds.left_out));
 }
 
 }  // namespace raydix

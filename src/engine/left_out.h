@@ -9,6 +9,7 @@
 #include <span>
 #include <string>
 
+#include "base/options.h"
 #include "primitives/double_sources.h"
 #include "primitives/sources.h"
 
@@ -37,7 +38,7 @@ void refuse_left_out(std::uint32_t geometry, const char* kind, const Source& sou
     if (count == 0) return;
     throw InputError("geometry " + std::to_string(geometry) + ": " + kind + ' ' +
                      std::to_string(first) + ": not finite, out of range or inverted" +
-                     (count > 1 ? ", as are " + std::to_string(count - 1) + " others" : ""));
+                     others_too(count));
 }
 
 }  // namespace raydix

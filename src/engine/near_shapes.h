@@ -64,92 +64,86 @@ auto closest_on_capsule(Double3 a, Double3 b, double radius, Vec q) {
 /// The image of a ball around 0 under a linear map, as queries of distance need it: an ellipsoid.
 class BallImage {
 public:
-    BallImage(const Affine& map, double radius) : map_(map), radius_(radius) {
-        const Double3 x{map.x.x, map.y.x, map.z.x}, y{map.x.y, map.y.y, map.z.y},
-            z{map.x.z, map.y.z, map.z.z};
-        square_ = {{{dot(x, x), dot(x, y), dot(x, z)},
-                    {dot(y, x), dot(y, y), dot(y, z)},
-                    {dot(z, x), dot(z, y), dot(z, z)}}};
-        turn_to_axes();
+    BallImage(const Affine& map, double radius)
+        : reach_(Double3{length(map.x), length(map.y), length(map.z)} * radius) {
+        std::array<Double3, 3> rows{map.x, map.y, map.z};
+        turn_to_axes(rows);
+        double least = infinity, most = 0.0;
+        for (const Double3& row : rows)
+            least = std::min(least, dot(row, row)), most = std::max(most, dot(row, row));
+        scale_ = least >= most * (1.0 - 1e-12) ? std::sqrt(most) : 0.0;
+        most_ = std::sqrt(most) * radius;
+        for (std::size_t k = 0; k < 3; ++k)  // no axis is 0: thinner is below all rounding
+            part_[k] = most > 0.0 ? std::max(length(rows[k]) / std::sqrt(most), 0x1p-60) : 1.0;
     }
 
     /// The scale of a map that keeps shapes; 0: this one does not.
-    [[nodiscard]] double scale() const {
-        const double most = std::max({square_[0][0], square_[1][1], square_[2][2]}),
-                     least = std::min({square_[0][0], square_[1][1], square_[2][2]});
-        return least >= most * (1.0 - 1e-12) ? std::sqrt(most) : 0.0;
-    }
+    [[nodiscard]] double scale() const { return scale_; }
     /// How far it reaches along each axis.
-    [[nodiscard]] Double3 reach() const {
-        return Double3{length(map_.x), length(map_.y), length(map_.z)} * radius_;
-    }
-    /// Its point that is closest to y; y itself inside. The least |map w - y| with |w| <= radius:
-    /// by the one root of |w(s)| = radius, w(s) = (map^T map + s)^-1 map^T y (Newton's steps for
-    /// 1 / |w|, which come from one side; More, Sorensen 1983).
+    [[nodiscard]] Double3 reach() const { return reach_; }
+    /// Its point that is closest to y; y itself inside. Along the main axes, in units of the
+    /// longest: part^2 g / (part^2 + s) by the one root of |w(s)| = 1, w(s) = part g / (part^2 + s)
+    /// (Newton's steps for 1 / |w|, which come from one side; More, Sorensen 1983).
     [[nodiscard]] Double3 closest(Double3 y) const {
-        // map^T y along the main axes.
-        const Double3 back{map_.x.x * y.x + map_.y.x * y.y + map_.z.x * y.z,
-                           map_.x.y * y.x + map_.y.y * y.y + map_.z.y * y.z,
-                           map_.x.z * y.x + map_.y.z * y.y + map_.z.z * y.z};
-        const double g[3] = {dot(axis_[0], back), dot(axis_[1], back), dot(axis_[2], back)};
-        if (norm_at(g, 0.0) <= radius_) return y;
-        if (radius_ == 0.0) return {};
-        double s = 0.0;
+        if (most_ == 0.0) return {};
+        double g[3], outside = 0.0, s = 0.0;
+        for (std::size_t k = 0; k < 3; ++k) {
+            g[k] = dot(axis_[k], y) / most_;
+            outside += (g[k] / part_[k]) * (g[k] / part_[k]);
+            s = std::max(s,
+                         part_[k] * (std::fabs(g[k]) - part_[k]));  // no w is above 1 at the root
+        }
+        if (outside <= 1.0) return y;
         for (int step = 0; step < 100; ++step) {
-            const double norm = norm_at(g, s);
-            double slope = 0.0;  // of |w|^2 / -2
+            double sum = 0.0, slope = 0.0;  // |w|^2, and its slope / -2
             for (std::size_t k = 0; k < 3; ++k) {
-                const double w = g[k] / (square_[k][k] + s);
-                slope += w * w / (square_[k][k] + s);
+                const double below = part_[k] * part_[k] + s, w = part_[k] * g[k] / below;
+                sum += w * w;
+                slope += w * w / below;
             }
-            const double next = s + (norm / radius_ - 1.0) * norm * norm / slope;
+            const double next = s + (std::sqrt(sum) - 1.0) * sum / slope;
             const bool still = next > s * (1.0 + 0x1p-50);
             s = std::max(s, next);
             if (!still) break;
         }
-        Double3 w;
-        for (std::size_t k = 0; k < 3; ++k) w = w + axis_[k] * (g[k] / (square_[k][k] + s));
-        return map_.vector(w);
+        Double3 point;
+        for (std::size_t k = 0; k < 3; ++k) {
+            const double square = part_[k] * part_[k];
+            point = point + axis_[k] * (square * g[k] / (square + s) * most_);
+        }
+        return point;
     }
 
 private:
-    [[nodiscard]] double norm_at(const double (&g)[3], double s) const {
-        double sum = 0.0;
-        for (std::size_t k = 0; k < 3; ++k) {
-            const double w = g[k] / (square_[k][k] + s);
-            sum += w * w;
-        }
-        return std::sqrt(sum);
-    }
-    /// Jacobi's rotations: square_ becomes diagonal.
-    void turn_to_axes() {
+    /// Jacobi's rotations from one side (Hestenes 1958) until no two rows have a common part. The
+    /// least axis keeps its digits, which the square of the map would lose.
+    void turn_to_axes(std::array<Double3, 3>& rows) {
         axis_ = {Double3{1, 0, 0}, Double3{0, 1, 0}, Double3{0, 0, 1}};
-        for (int sweep = 0; sweep < 16; ++sweep)
-            for (std::size_t p = 0; p < 2; ++p)
-                for (std::size_t q = p + 1; q < 3; ++q) turn(p, q);
+        bool turned = true;
+        for (int sweep = 0; sweep < 16 && turned; ++sweep) {
+            turned = turn(rows, 0, 1);
+            turned = turn(rows, 0, 2) || turned;
+            turned = turn(rows, 1, 2) || turned;
+        }
     }
-    void turn(std::size_t p, std::size_t q) {
-        auto& m = square_;
-        if (m[p][q] == 0.0) return;
-        const double angle = 0.5 * (m[q][q] - m[p][p]) / m[p][q];
+    bool turn(std::array<Double3, 3>& rows, std::size_t p, std::size_t q) {
+        const double common = dot(rows[p], rows[q]), pp = dot(rows[p], rows[p]),
+                     qq = dot(rows[q], rows[q]);
+        if (std::fabs(common) <= 0x1p-50 * std::sqrt(pp) * std::sqrt(qq)) return false;
+        const double angle = 0.5 * (qq - pp) / common;
         const double t = std::copysign(1.0, angle) / (std::fabs(angle) + std::hypot(angle, 1.0)),
                      c = 1.0 / std::sqrt(t * t + 1.0), s = t * c;
-        for (std::size_t k = 0; k < 3; ++k) {
-            const double a = m[k][p], b = m[k][q];
-            m[k][p] = c * a - s * b, m[k][q] = s * a + c * b;
+        for (auto* of : {&rows, &axis_}) {
+            const Double3 a = (*of)[p], b = (*of)[q];
+            (*of)[p] = a * c - b * s, (*of)[q] = a * s + b * c;
         }
-        for (std::size_t k = 0; k < 3; ++k) {
-            const double a = m[p][k], b = m[q][k];
-            m[p][k] = c * a - s * b, m[q][k] = s * a + c * b;
-        }
-        const Double3 a = axis_[p], b = axis_[q];
-        axis_[p] = a * c - b * s, axis_[q] = a * s + b * c;
+        return true;
     }
 
-    Affine map_;
-    double radius_;
-    std::array<std::array<double, 3>, 3> square_;  // map^T map, turned to its axes
-    std::array<Double3, 3> axis_;
+    Double3 reach_;
+    double scale_, most_;          // most_: the longest half axis
+    std::array<double, 3> part_;   // half axes as parts of the longest
+    std::array<Double3, 3> axis_;  // their directions
 };
 
 /// Of all that images of balls of a radius have around points of the segment a, b.

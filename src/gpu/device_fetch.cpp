@@ -4,6 +4,8 @@
 
 #include <string>
 
+#include "base/options.h"
+
 namespace raydix {
 namespace {
 
@@ -37,8 +39,7 @@ void check_counts(const DeviceInputCounts& counts, PrimitiveKind kind, bool stri
                          ": an index is past the last of the vertices");
     if (strict && counts.left_out != 0)
         throw InputError(std::string(name_of(kind)) + " " + std::to_string(counts.first_left_out) +
-                         ": not finite, out of range or inverted, as are " +
-                         std::to_string(counts.left_out - 1) + " others");
+                         ": not finite, out of range or inverted" + others_too(counts.left_out));
 }
 
 }  // namespace raydix

@@ -261,11 +261,7 @@ PointRows<Scalar> BasicDistributedPoints<Scalar>::State::within(
     RowStore<Found> store(what, queries.size(), query_options.max_result_bytes);
     Kind kind(view(), region, queries, store);
     Call call(comm, options);
-    call.begin<Kind>(name, [&] {
-        if (!(region.least() >= 0))
-            throw InputError("radius is " + std::to_string(region.least()) +
-                             "; it must be 0 or more");
-    });
+    call.begin<Kind>(name, [&] { check_not_negative("radius", region.least()); });
     call.run(kind);
     call.finish([&] {
         store.finish(

@@ -485,9 +485,7 @@ auto BasicDistributedScene<Scalar>::closest_points(std::span<const Point> querie
     return state_->template ask<ClosestPointKind<Scalar>, Answers<Closest, QueryCounts>>(
         "closest_points, " + exact_text(max_distance) + ", mask " + std::to_string(mask),
         [&](auto& kind, auto& answers) {
-            if (!(max_distance >= 0))
-                throw InputError("max_distance is " + std::to_string(max_distance) +
-                                 "; it must be 0 or more");
+            check_not_negative("max_distance", max_distance);
             state_->require_closest_points(mask);
             kind.emplace(state_->parts(), queries, max_distance, mask, answers);
         });

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "base/check.h"
+#include "base/options.h"
 #include "exec/parallel.h"
 #include "points/build_tree.h"
 #include "sort/radix_sort.h"
@@ -20,6 +21,50 @@ namespace {
 constexpr std::size_t least_ratio = 8;
 /// All is built again when more than a quarter of the places are holes.
 constexpr std::size_t places_of_four = 3;
+
+/// A box around points; inverted around none.
+template <class T, int Dim>
+struct Extent {
+    Extent() {
+        std::fill_n(lo, Dim, std::numeric_limits<T>::infinity());
+        std::fill_n(hi, Dim, -std::numeric_limits<T>::infinity());
+    }
+    void add(int d, T low, T high) {  // NaN adds nothing
+        lo[d] = std::min(lo[d], low);
+        hi[d] = std::max(hi[d], high);
+    }
+    T lo[Dim], hi[Dim];
+};
+
+template <class T, int Dim>
+Extent<T, Dim> extent_of(const PointLeaf<T, Dim>& leaf) {
+    Extent<T, Dim> extent;
+    for (int d = 0; d < Dim; ++d)
+        for (const T at : leaf.at[d]) extent.add(d, at, at);
+    return extent;
+}
+
+/// Of its children that have points.
+template <class T, int Dim>
+Extent<T, Dim> extent_of(const PointNode<T, Dim>& node) {
+    Extent<T, Dim> extent;
+    for (std::uint32_t c = 0; c < node.children; ++c)
+        for (int d = 0; d < Dim && node.points[c] != 0; ++d)
+            extent.add(d, node.lo[d][c], node.hi[d][c]);
+    return extent;
+}
+
+/// Whether the child had another box.
+template <class T, int Dim>
+bool set_box(const Extent<T, Dim>& box, PointNode<T, Dim>& node, std::uint32_t child) {
+    bool differs = false;
+    for (int d = 0; d < Dim; ++d) {
+        differs |= node.lo[d][child] != box.lo[d] || node.hi[d][child] != box.hi[d];
+        node.lo[d][child] = box.lo[d];
+        node.hi[d][child] = box.hi[d];
+    }
+    return differs;
+}
 
 constexpr std::uint32_t first_root = 1, first_node = first_root + boxes_per_node;
 
@@ -45,7 +90,7 @@ void PointForest<T, Dim>::insert(std::span<const Point> points) {
         const auto bounds = bounds_of_points<T, Dim>(reinterpret_cast<const T*>(points.data()), n);
         if (bounds.left_out != 0)
             throw InputError("point " + std::to_string(bounds.first_left_out) +
-                             ": not finite or out of range");
+                             ": not finite or out of range" + others_too(bounds.left_out));
     }
     begin();
     const std::size_t level = levels_that_stay(n);
@@ -71,23 +116,15 @@ std::uint32_t PointForest<T, Dim>::remove(std::span<const std::uint32_t> ids) {
                              std::to_string(arrays_.input_count) + " were given");
     begin();
     std::uint32_t removed = 0;
-    bool at_bounds = false;
     for (const std::uint32_t id : ids) {
         if (state_.leaf_of[id] == no_primitive) continue;
-        const Leaf& leaf = arrays_.leaves[state_.leaf_of[id]];
-        const auto slot =
-            static_cast<std::uint32_t>(std::find(leaf.id, leaf.id + points_per_leaf, id) - leaf.id);
-        at_bounds = at_bounds || on_bounds(leaf, slot);
         take_out(id);
         ++removed;
     }
     refresh();
     std::size_t places = 0;
     for (const PointLevel& level : state_.levels) places += level.built;
-    if (4 * std::size_t{arrays_.tree.points} < places_of_four * places)
-        rebuild_all();
-    else if (at_bounds)
-        fit_bounds();
+    if (4 * std::size_t{arrays_.tree.points} < places_of_four * places) rebuild_all();
     return removed;
 }
 
@@ -281,8 +318,8 @@ void PointForest<T, Dim>::set_top(std::size_t child, const Arrays& part, std::ui
     top.children = static_cast<std::uint32_t>(child + 1);
 }
 
-/// The last point of the group takes the place of the one that goes. Boxes stay as they are, and
-/// lowest numbers too: both may be too low, never too high.
+/// The last point of the group takes the place of the one that goes. Boxes up to the root become
+/// those of what is left. Lowest numbers stay: they may be too low, never too high.
 template <class T, int Dim>
 void PointForest<T, Dim>::take_out(std::uint32_t id) {
     const std::uint32_t at = std::exchange(state_.leaf_of[id], no_primitive);
@@ -295,10 +332,16 @@ void PointForest<T, Dim>::take_out(std::uint32_t id) {
     }
     leaf.id[slot] = leaf.id[last];
     leaf.id[last] = no_primitive;
+    auto left = extent_of(leaf);
+    bool fits = false;  // the box of `child`, and so all above
     std::uint32_t child = at;
     for (std::uint32_t node = state_.parent_of_leaf[at];;) {
-        --arrays_.nodes[node].points[child - arrays_.nodes[node].below];
+        Node& above = arrays_.nodes[node];
+        const std::uint32_t c = child - above.below;
+        --above.points[c];
+        if (above.points[c] != 0 && !fits) fits = !set_box(left, above, c);
         if (node == 0) break;
+        if (!fits) left = extent_of(above);
         child = node;
         node = state_.parent_of_node[node];
     }
@@ -320,48 +363,11 @@ void PointForest<T, Dim>::refresh() {
         tree.node_count = level.first_node + level.nodes;
         tree.depth = std::max(tree.depth, level.depth + 1);
     }
-    constexpr T inf = std::numeric_limits<T>::infinity();
+    const auto all = extent_of(top);
     for (int d = 0; d < Dim; ++d) {
-        T lo = inf, hi = -inf;
-        for (std::size_t c = 0; c < state_.levels.size(); ++c) {
-            lo = std::min(lo, top.lo[d][c]);
-            hi = std::max(hi, top.hi[d][c]);
-        }
-        (&arrays_.bounds.lo.x)[d] = lo;
-        (&arrays_.bounds.hi.x)[d] = hi;
+        (&arrays_.bounds.lo.x)[d] = all.lo[d];
+        (&arrays_.bounds.hi.x)[d] = all.hi[d];
     }
-}
-
-template <class T, int Dim>
-bool PointForest<T, Dim>::on_bounds(const Leaf& leaf, std::uint32_t slot) const {
-    for (int d = 0; d < Dim; ++d)
-        if (leaf.at[d][slot] == (&arrays_.bounds.lo.x)[d] ||
-            leaf.at[d][slot] == (&arrays_.bounds.hi.x)[d])
-            return true;
-    return false;
-}
-
-/// Boxes of the trees below the top, tight again.
-template <class T, int Dim>
-void PointForest<T, Dim>::fit_bounds() {
-    constexpr T inf = std::numeric_limits<T>::infinity();
-    Node& top = arrays_.nodes[0];
-    for (std::size_t c = 0; c < state_.levels.size(); ++c) {
-        const PointLevel& level = state_.levels[c];
-        for (int d = 0; d < Dim; ++d) {
-            T lo = inf, hi = -inf;
-            for (std::uint32_t i = level.first_leaf; i < level.first_leaf + level.leaves; ++i)
-                for (std::uint32_t k = 0; k < points_per_leaf; ++k) {
-                    const Leaf& leaf = arrays_.leaves[i];
-                    if (leaf.id[k] == no_primitive) break;
-                    lo = std::min(lo, leaf.at[d][k]);
-                    hi = std::max(hi, leaf.at[d][k]);
-                }
-            top.lo[d][c] = lo;
-            top.hi[d][c] = hi;
-        }
-    }
-    refresh();
 }
 
 template <class T, int Dim>

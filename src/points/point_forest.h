@@ -48,8 +48,6 @@ private:
     void set_top(std::size_t child, const Arrays& part, std::uint32_t lowest_id);
     void take_out(std::uint32_t id);
     void refresh();
-    [[nodiscard]] bool on_bounds(const Leaf& leaf, std::uint32_t slot) const;
-    void fit_bounds();
 
     Arrays& arrays_;
     PointForestState& state_;

@@ -38,8 +38,7 @@ void build(const T* points, std::size_t n, detail::PointArrays<T, Dim>& arrays) 
     const PointBounds<T, Dim> bounds = bounds_of_points<T, Dim>(points, n);
     if (arrays.options.strict && bounds.left_out != 0)
         throw InputError("point " + std::to_string(bounds.first_left_out) +
-                         ": not finite or out of range, as are " +
-                         std::to_string(bounds.left_out - 1) + " others");
+                         ": not finite or out of range" + others_too(bounds.left_out));
     arrays.left_out = bounds.left_out;
     set_bounds(bounds, arrays.bounds);
     arrays.ms.bounds = stage.lap();

@@ -44,14 +44,11 @@ PointLists<typename Index::Scalar> lists_of(const Index& index, const Within<Ind
 template <class Index>
 using Nearest = NearestJob<typename Index::Scalar, Index::dimension>;
 
+/// Without the limit.
 template <class Index>
 Nearest<Index> nearest_job(const Index& index, PointsOf<Index> queries, std::uint32_t k,
-                           std::span<std::uint32_t> indices, ScalarsOf<Index> distances,
-                           double max_distance = infinity) {
-    check_not_negative("max_distance", max_distance);
-    const auto limit = static_cast<typename Index::Scalar>(max_distance);
+                           std::span<std::uint32_t> indices, ScalarsOf<Index> distances) {
     Nearest<Index> job{};
-    job.limit_d2 = limit * limit;
     job.tree = index.arrays().tree;
     job.queries = values_of<typename Index::Scalar>(queries);
     job.n = queries.size();
@@ -61,13 +58,21 @@ Nearest<Index> nearest_job(const Index& index, PointsOf<Index> queries, std::uin
     return job;
 }
 
+/// In a plain float environment: both may be denormal. Not inlined: a compiler may move arithmetic
+/// to before the environment is set.
+template <class Scalar>
+[[gnu::noinline]] Scalar square_limit_of(double max_distance) {
+    const auto limit = static_cast<Scalar>(max_distance);
+    return limit * limit;
+}
+
 /// order(queries) -> the order in which to take them.
 template <class Index, class Order>
-QueryCounts nearest(const Nearest<Index>& job, const PointQueryOptions& options,
-                    const Order& order_of) {
+QueryCounts nearest(Nearest<Index> job, const PointQueryOptions& options, const Order& order_of) {
     const KernelsOf<Index>& kernels = kernels_for<Index>(options.isa);
     std::vector<PointJobCounts> parts(blocks_of(job.n));
     with_threads(options.threads, [&] {
+        job.limit_d2 = square_limit_of<typename Index::Scalar>(options.max_distance);
         const std::vector<std::uint32_t> order = order_of(job.queries);
         for_each_block(job.n, queries_per_block,
                        [&](std::size_t b, std::size_t begin, std::size_t end) {
@@ -101,13 +106,14 @@ QueryCounts knn(const Index& index, PointsOf<Index> queries, std::uint32_t k,
                 const PointQueryOptions& options) {
     check_enum("order", options.order, QueryOrder::sorted);
     require_neighbours(k);
+    check_not_negative("max_distance", options.max_distance);
     for (const std::size_t room : {indices.size(), distances.size()})
         if (room / k != queries.size() || room % k != 0)
             throw InputError("knn: " + std::to_string(queries.size()) + " queries for " +
                              std::to_string(k) + " each, but room for " + std::to_string(room) +
                              " results");
-    return nearest<Index>(nearest_job(index, queries, k, indices, distances, options.max_distance),
-                          options, [&](const typename Index::Scalar* first) {
+    return nearest<Index>(nearest_job(index, queries, k, indices, distances), options,
+                          [&](const typename Index::Scalar* first) {
                               return order_for(index, first, queries.size(), Index::dimension,
                                                options.order);
                           });
@@ -126,33 +132,32 @@ NearestPoints<typename Index::Scalar> knn(const Index& index, PointsOf<Index> qu
     NearestPoints<Scalar> result;
     result.indices.reset(queries.size() * k);
     result.distances.reset(queries.size() * k);
-    result.counts = nearest<Index>(nearest_job(index, queries, k, result.indices.span(),
-                                               result.distances.span(), options.max_distance),
-                                   options, [&](const Scalar* first) {
-                                       return order_within(budget, index, first, queries.size(),
-                                                           Index::dimension, options.order);
-                                   });
+    result.counts = nearest<Index>(
+        nearest_job(index, queries, k, result.indices.span(), result.distances.span()), options,
+        [&](const Scalar* first) {
+            return order_within(budget, index, first, queries.size(), Index::dimension,
+                                options.order);
+        });
     return result;
 }
 
 template <class Index>
 std::uint32_t knn(const Index& index, const typename Index::Point& query,
-                  std::span<std::uint32_t> indices, ScalarsOf<Index> distances) {
+                  std::span<std::uint32_t> indices, ScalarsOf<Index> distances,
+                  double max_distance) {
+    using Scalar = typename Index::Scalar;
     if (indices.empty()) throw InputError("knn: k is 0; it must be at least 1");
     if (indices.size() != distances.size() || indices.size() > no_primitive)
         throw InputError("knn: room for " + std::to_string(indices.size()) + " indices and " +
                          std::to_string(distances.size()) + " distances");
+    check_not_negative("max_distance", max_distance);
     const FloatEnvironment plain;
-    NearestJob<typename Index::Scalar, Index::dimension> job{};
-    job.tree = index.arrays().tree;
-    job.limit_d2 = infinity;
-    job.queries = &query.x;
-    job.n = 1;
-    job.k = static_cast<std::uint32_t>(indices.size());
-    job.indices = indices.data();
-    job.distances = distances.data();
+    Nearest<Index> job =
+        nearest_job(index, PointsOf<Index>(&query, 1), static_cast<std::uint32_t>(indices.size()),
+                    indices, distances);
+    job.limit_d2 = square_limit_of<Scalar>(max_distance);
     PointJobCounts counts;
-    point_kernels<typename Index::Scalar, Index::dimension>().front().nearest(job, counts);
+    point_kernels<Scalar, Index::dimension>().front().nearest(job, counts);
     return static_cast<std::uint32_t>(counts.found);
 }
 
@@ -306,7 +311,7 @@ bool visit_radius(const Index& index, const typename Index::Point& query,
     template NearestPoints<Index::Scalar> knn(const Index&, PointsOf<Index>, std::uint32_t,       \
                                               const PointQueryOptions&);                          \
     template std::uint32_t knn(const Index&, const Index::Point&, std::span<std::uint32_t>,       \
-                               ScalarsOf<Index>);                                                 \
+                               ScalarsOf<Index>, double);                                         \
     template PointLists<Index::Scalar> radius_search(const Index&, PointsOf<Index>,               \
                                                      ScalarOf<Index>, const PointQueryOptions&);  \
     template PointLists<Index::Scalar> radius_search(                                             \

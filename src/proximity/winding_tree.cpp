@@ -10,8 +10,9 @@
 namespace raydix {
 namespace {
 
-/// A subtree is far if the query is this many radii away: the error of the two terms, summed over
-/// a mesh, then stays below a hundredth.
+/// A subtree is far if the query is this many radii away. The error of the two terms, summed over a
+/// mesh, has no bound of its own: it grows with the area that is seen, so that layers add theirs
+/// up.
 constexpr double far_radii = 4.0;
 
 struct AreaSum {

@@ -7,6 +7,7 @@
 #include <raydix/mesh.h>
 #include <raydix/model.h>
 #include <raydix/picture.h>
+#include <raydix/points.h>
 #include <raydix/rays.h>
 #include <raydix/scene.h>
 #include <raydix/scene_queries.h>
@@ -212,6 +213,31 @@ TEST(CallerEnvironmentOfQueries, LeavesLimitsOfSmallDistances) {
     expect_same_bytes([&] { return bytes_of(closest_points(scene, queries, {most})[0].prim); });
     expect_same_bytes([&] { return bytes_of(closest_point(scene, queries[0], most).prim); });
     expect_same_bytes([&] { return bytes_of(signed_distances(solid, queries, {most})); });
+}
+
+template <class Index>
+void expect_same_points(double far) {
+    using Scalar = typename Index::Scalar;
+    const std::vector<typename Index::Point> points{
+        {0, 0, 0}, {static_cast<Scalar>(far), 0, 0}, {1, 0, 0}};
+    const Index index = build_points(points);
+    const auto found = [&](double most) {
+        std::uint32_t ids[2];
+        Scalar distances[2];
+        const std::uint64_t counts[] = {
+            knn(index, {points.data(), 1}, 2, {.max_distance = most}).counts.found,
+            knn(index, points[0], ids, distances, most),
+            radius_count(index, points[0], static_cast<Scalar>(most))};
+        return std::vector<std::uint64_t>(counts, counts + 3);
+    };
+    ASSERT_EQ(found(2 * far), (std::vector<std::uint64_t>{2, 2, 2}));
+    ASSERT_EQ(found(0.5 * far), (std::vector<std::uint64_t>{1, 1, 1}));
+    expect_same_bytes([&] { return bytes_of(found(2 * far)) + bytes_of(found(0.5 * far)); });
+}
+
+TEST(CallerEnvironmentOfPoints, LeavesLimitsOfSmallDistances) {
+    expect_same_points<Points>(1e-20);
+    expect_same_points<PointsD>(1e-160);
 }
 
 }  // namespace

@@ -114,7 +114,9 @@ TYPED_TEST(LeftOut, Shapes) {
         EXPECT_EQ(scene.commit().left_out, left_out);
         const std::string wanted =
             "geometry 0: " + refused + ": not finite, out of range or inverted" +
-            (left_out > 1 ? ", as are " + std::to_string(left_out - 1) + " others" : "");
+            (left_out == 1   ? ""
+             : left_out == 2 ? ", as is 1 other"
+                             : ", as are " + std::to_string(left_out - 1) + " others");
         EXPECT_EQ(this->refusal(scene, {}), wanted);
         EXPECT_EQ(this->refusal(scene, {.quality = Quality::high}), wanted);
     };

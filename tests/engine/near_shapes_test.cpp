@@ -123,6 +123,34 @@ TEST(NearShapes, PointsOfImagesAreTheClosest) {
     }
 }
 
+/// Spheres as flat as paper, whose own axes lie askew: distances of the disc that is left.
+TEST(NearShapes, FlatImagesKeepTheirDistances) {
+    RandomScenes random(14);
+    struct {
+        Double3 query;
+        double distance;
+    } const cases[] = {{{0.3, 0.2, 0.5}, 0.5}, {{0.3, 0.2, -1e-3}, 1e-3},
+                       {{2, 0, 0}, 1},         {{-3, 4, 0}, 4},
+                       {{0, 5, 3}, 5},         {{0, 0.5, 0}, 0}};
+    for (int round = 0; round < 100 * static_cast<int>(thorough); ++round) {
+        // Three directions at right angles: columns of the map are these, made flat along z.
+        const Double3 a(random.in(-1, 1)), b(random.in(-1, 1));
+        const Double3 x = a * (1 / length(a)), z = cross(x, b) * (1 / length(cross(x, b))),
+                      y = cross(z, x);
+        for (const double flat : {1e-4, 3e-8, 1e-8, 3e-9, 1e-12, 1e-30}) {
+            const Affine map{x, y, z * flat, {}};
+            const BallImage ball(map, 2), half(map, 1);
+            for (const auto& at : cases) {
+                const Double3 p = half.closest(at.query);
+                EXPECT_NEAR(length(p - at.query), at.distance, 2 * flat + 1e-13)
+                    << flat << ", round " << round;
+                EXPECT_LE(std::fabs(p.z), flat + 1e-15);
+                EXPECT_NEAR(length(ball.closest(at.query * 2.0) - p * 2.0), 0.0, 1e-7);
+            }
+        }
+    }
+}
+
 std::string message_of(const auto& call) {
     try {
         call();

@@ -122,7 +122,9 @@ TEST(ErrorsOverRanks, OptionsOutOfRangeAreRefused) {
     const DistributedPoints made(MPI_COMM_WORLD, points);
     EXPECT_NE(message_of<InputError>([&] { (void)made.knn(points, 0); }).find("k is 0"),
               std::string::npos);
-    EXPECT_NE(message_of<InputError>([&] { (void)made.radius(points, -1.0f); }).find("radius"),
+    EXPECT_NE(message_of<InputError>([&] {
+                  (void)made.radius(points, -1e-9f);
+              }).find("radius is -1e-09; it must be 0 or more"),
               std::string::npos);
     EXPECT_EQ(message_of<InputError>(
                   [] { const DistributedPoints none(MPI_COMM_NULL, std::span<const Vec3>()); }),

@@ -3,13 +3,17 @@
 #include <raydix/error.h>
 #include <raydix/points.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <iostream>
 #include <limits>
+#include <numeric>
 #include <random>
 #include <vector>
 
+#include "base/math.h"
+#include "points/point_arrays.h"
 #include "support/message.h"
 #include "support/point_reference.h"
 #include "support/support.h"
@@ -155,6 +159,62 @@ TYPED_TEST(Changing, AnswersAreThoseOfAFreshIndex) {
         Kept<TypeParam> kept{{built.begin(), built.end()}, std::vector<bool>(built.size(), true)};
         come_and_go<TypeParam>(points, build_points(built), kept, random);
     }
+}
+
+/// Points below a node; `lo` and `hi` become their box. Every box on the way is the one of its
+/// points.
+std::uint32_t expect_boxes_that_fit(const PointTreeView<float, 3>& tree, std::uint32_t at, Vec3& lo,
+                                    Vec3& hi) {
+    lo = {infinity, infinity, infinity};
+    hi = {-infinity, -infinity, -infinity};
+    const PointNode<float, 3>& node = tree.nodes[at];
+    std::uint32_t sum = 0;
+    for (std::uint32_t c = 0; c < node.children; ++c) {
+        Vec3 least{infinity, infinity, infinity}, most{-infinity, -infinity, -infinity};
+        std::uint32_t points = 0;
+        if (node.is_bottom == 0) {
+            points = expect_boxes_that_fit(tree, node.below + c, least, most);
+        } else {
+            const PointLeaf<float, 3>& leaf = tree.leaves[node.below + c];
+            for (; points < points_per_leaf && leaf.id[points] != no_primitive; ++points) {
+                const Vec3 p{leaf.at[0][points], leaf.at[1][points], leaf.at[2][points]};
+                least = min_of(least, p);
+                most = max_of(most, p);
+            }
+        }
+        EXPECT_EQ(points, node.points[c]);
+        for (int d = 0; d < 3 && points != 0; ++d) {
+            EXPECT_EQ(node.lo[d][c], (&least.x)[d]) << "node " << at << ", child " << c;
+            EXPECT_EQ(node.hi[d][c], (&most.x)[d]) << "node " << at << ", child " << c;
+        }
+        lo = min_of(lo, least);
+        hi = max_of(hi, most);
+        sum += points;
+    }
+    return sum;
+}
+
+/// Whether one goes from the inside or from the border, all at once or each alone.
+TEST(ChangingPoints, BoxesFitWhatIsLeft) {
+    std::mt19937_64 random(seed);
+    std::uniform_real_distribution<float> place(0, 1);
+    std::vector<Vec3> points(5000);
+    for (Vec3& p : points) p = {place(random), place(random), place(random)};
+    Points index = build_points(std::span(points).first(4000));
+    index.insert(std::span(points).subspan(4000));
+    std::vector<std::uint32_t> by_x(points.size());
+    std::iota(by_x.begin(), by_x.end(), 0u);
+    std::sort(by_x.begin(), by_x.end(),
+              [&](std::uint32_t a, std::uint32_t b) { return points[a].x < points[b].x; });
+    for (std::uint32_t i = 0; i < 900; ++i) {
+        index.remove({&by_x[i], 1});
+        EXPECT_EQ(index.bounds().lo.x, points[by_x[i + 1]].x);
+    }
+    index.remove(std::span(by_x).last(200));
+    Vec3 lo, hi;
+    EXPECT_EQ(expect_boxes_that_fit(index.arrays().tree, 0, lo, hi), 3900u);
+    EXPECT_EQ(lo.x, index.bounds().lo.x);
+    EXPECT_EQ(hi.x, points[by_x[4799]].x);
 }
 
 TEST(ChangingPoints, TreesStayFew) {

@@ -106,6 +106,14 @@ TYPED_TEST(Knn, FarPointsDoNotCount) {
                     EXPECT_EQ(found.counts.found, wanted.counts.found);
                     rows += queries.size();
                 }
+                NearestPoints<T> single{
+                    Buffer<std::uint32_t>(queries.size() * k), Buffer<T>(queries.size() * k), {}};
+                std::uint64_t found = 0;
+                for (std::size_t q = 0; q < queries.size(); ++q)
+                    found += knn(index, queries[q], single.indices.span().subspan(q * k, k),
+                                 single.distances.span().subspan(q * k, k), limit);
+                EXPECT_EQ(differences(single, wanted), 0u) << set.name << ", within " << limit;
+                EXPECT_EQ(found, wanted.counts.found);
             }
     }
     EXPECT_GT(cut, 20u);
@@ -222,6 +230,8 @@ TYPED_TEST(Knn, BadCalls) {
                               (void)knn(index, queries, 2, options);
                       }).find("max_distance is"),
                       std::string::npos);
+    EXPECT_EQ(message([&] { knn(index, Point{}, ids, distances, -1e-9); }),
+              "max_distance is -1e-09; it must be 0 or more");
     EXPECT_EQ(knn(index, queries, 2, ids, distances).found, 6u);
 }
 

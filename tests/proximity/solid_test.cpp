@@ -176,6 +176,41 @@ TEST(Solid, AFigureFarAwayAgreesWithItselfAlongOtherAxes) {
     EXPECT_GT(judged, 5u);
 }
 
+/// Sheets of 30 x 30 squares of two triangles, one over the other within a thousandth.
+Mesh layers(std::uint32_t count) {
+    constexpr std::uint32_t side = 31;
+    Mesh mesh;
+    for (std::uint32_t layer = 0; layer < count; ++layer)
+        for (std::uint32_t i = 0; i < side * side; ++i) {
+            const auto at = static_cast<std::uint32_t>(mesh.vertices.size());
+            mesh.vertices.push_back({float(i % side) / (side - 1), float(i / side) / (side - 1),
+                                     0.5f + 0.001f * float(layer) / float(count)});
+            if (i % side == side - 1 || i / side == side - 1) continue;
+            mesh.triangles.push_back({at, at + 1, at + side + 1});
+            mesh.triangles.push_back({at, at + side + 1, at + side});
+        }
+    return mesh;
+}
+
+/// What the two terms leave out grows with the area that is seen: a hundredth bounds one sheet.
+TEST(Solid, LayersAddUpTheirErrorsOfWindingNumbers) {
+    for (const std::uint32_t count : {1u, 40u}) {
+        const Mesh mesh = layers(count);
+        const Bvh bvh = build_bvh(mesh);
+        const Solid solid(bvh);
+        ASSERT_EQ(solid.rule(), InsideRule::winding);
+        Random random(seed);
+        std::vector<Vec3> points(300);
+        for (Vec3& p : points) p = random.in({{0, 0, -1}, {1, 1, 2}});
+        const std::vector<double> numbers = winding_numbers(solid, points);
+        double worst = 0;
+        for (std::size_t i = 0; i < points.size(); ++i)
+            worst = std::max(worst, std::fabs(numbers[i] - exact_winding(mesh, points[i])));
+        std::cout << count << " layers: error " << worst << ", seed " << seed << '\n';
+        EXPECT_LT(worst, 0.01 * count);
+    }
+}
+
 TEST(Solid, BoxesHoldTheirSurface) {
     const Mesh mesh = joined(box_mesh({0, 0, 0}, {4, 4, 4}), box_mesh({6, 1, 1}, {9, 3, 3}));
     std::vector<Vec3> points;

@@ -212,6 +212,25 @@ def test_results_larger_than_their_limit():
         ),
         (ValueError, "radius is -1.*0 or more", lambda i: i.radius([0, 0, 0], -1)),
         (ValueError, "radius is nan.*0 or more", lambda i: i.radius([0, 0, 0], np.nan)),
+        (ValueError, "radius is -1;", lambda i: i.radius(np.zeros((0, 3)), -1)),
+        (ValueError, "radius is -1;", lambda i: i.count(np.zeros((0, 3)), -1)),
+        (
+            ValueError,
+            "max_distance is -1;",
+            lambda i: i.knn(np.zeros((0, 3)), 1, max_distance=-1),
+        ),
+        (
+            ValueError,
+            "radius 1048577 is -0.1; it must be 0 or more",
+            lambda i: i.radius(
+                np.zeros(((1 << 20) + 3, 3), "f4"), np.float32([0] * (1 << 20) + [1, -0.1, np.nan])
+            ),
+        ),
+        (
+            ValueError,
+            "radius 3 is nan;",
+            lambda i: i.radius(np.zeros((2, 2, 3)), [[0, 1], [2, np.nan]]),
+        ),
         (ValueError, r"boxes: expected shape \(..., 6\)", lambda i: i.box(np.zeros((2, 4)))),
     ],
 )

@@ -134,7 +134,7 @@ def test_strict_scenes():
     faces = np.concatenate([BOX[1], [[8, 0, 1], [0, 1, 2], [8, 8, 8]]])
     scene = raydix.Scene(strict=True)
     for call in (lambda: scene.add(bad, faces), lambda: raydix.Scene(bad, faces, strict=True)):
-        with pytest.raises(raydix.InputError, match="triangle 12 is not finite .* as are 1 others"):
+        with pytest.raises(raydix.InputError, match="triangle 12 is not finite .* as is 1 other"):
             call()
     id = scene.add(*BOX)
     with pytest.raises(raydix.InputError, match="geometry 0: triangle 12"):
@@ -151,7 +151,7 @@ def test_strict_scenes_in_float64():
         lambda: scene.add(bad, faces),
         lambda: raydix.Scene(bad, faces, strict=True, precision="float64"),
     ):
-        with pytest.raises(raydix.InputError, match="mesh: triangle 12: not finite .* 1 others"):
+        with pytest.raises(raydix.InputError, match="mesh: triangle 12: not finite .* 1 other"):
             call()
     id = scene.add(*BOX)
     with pytest.raises(raydix.InputError, match="geometry 0: triangle 12"):
@@ -185,3 +185,30 @@ def test_types_of_scenes_do_not_mix():
                 leaf._core, np.zeros((0, 12), world.dtype), np.zeros(1, np.uint32), None
             )
         assert len(world) == 1 and world.committed
+
+
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+def test_batches_of_nothing_are_checked_as_others(precision):
+    none, rays = np.zeros((0, 3)), np.zeros((0, 8))
+    balls = raydix.Scene(precision=precision)
+    balls.add_spheres([[0, 0, 0]], 1.0)
+    balls.commit()
+    mesh = raydix.Scene(*BOX, precision=precision)
+    for text, call in (
+        ("never committed", lambda s: s.closest_point(none)),
+        ("never committed", lambda s: s.intersect(none, none)),
+        ("never committed", lambda s: s.occluded(none, none)),
+        ("never committed", lambda s: s.all_hits(rays)),
+        ("never committed", lambda s: s.contains(none)),
+        ("never committed", lambda s: s.touched_by(spheres=np.zeros((0, 4)))),
+        ("spheres", lambda _: balls.contains(none)),
+        ("spheres", lambda _: balls.signed_distance(none)),
+        ("max_distance is -1", lambda _: mesh.closest_point(none, max_distance=-1)),
+        ("max_distance is -1", lambda _: mesh.signed_distance(none, max_distance=-1)),
+    ):
+        with pytest.raises(raydix.InputError, match=text):
+            call(raydix.Scene(precision=precision))
+    assert mesh.closest_point(none)["distance"].shape == (0,)
+    assert mesh.intersect(none, none).t.shape == (0,)
+    assert mesh.all_hits(rays)["offsets"].tolist() == [0]
+    assert mesh.touched_by(spheres=np.zeros((0, 4)))["offsets"].tolist() == [0]

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import support
 
+import raydix
 from raydix.scipy import KDTree, cKDTree
 
 BOXES = {"open": None, "periodic": (1.0, 1.0, 1.0, 1.0, 1.0), "one axis": (0, 1.0, 0, 0, 0)}
@@ -54,6 +55,39 @@ def test_neighbours_equal_brute_force(case, p):
         assert (indices[:, some:] == 300).all() and np.isinf(distances[:, some:]).all()
     assert tree.query(queries[-8], 5, p=p)[1].tolist() == [0, 1, 2, 3, 4]  # equal: by index
     assert (tree.query(queries, 3, p=p, distance_upper_bound=0)[1] == 300).all()
+
+
+@pytest.mark.parametrize("p", NORMS)
+def test_bounds_of_distance_drop_what_is_not_nearer(case, p):
+    tree, queries, _ = case
+    far, who = tree.query(queries, 7, p=p)
+    for bound in (0.02, 0.2, far[3, 2], np.nextafter(far[3, 2], 1), far.max(), np.inf, -1, np.nan):
+        distances, indices = tree.query(queries, 7, p=p, distance_upper_bound=bound)
+        nearer = far < bound
+        np.testing.assert_array_equal(distances, np.where(nearer, far, np.inf))
+        np.testing.assert_array_equal(indices, np.where(nearer, who, 300))
+
+
+@pytest.mark.parametrize(
+    ("p", "boxsize", "most"), [(1, None, 0.101), (np.inf, None, 0.174), (2, 1, 0.101)]
+)
+def test_bounds_of_distance_limit_the_search(monkeypatch, rng, p, boxsize, most):
+    tree = cKDTree(rng.uniform(size=(300, 3)), boxsize=boxsize)
+    reached = []
+    knn, radius = raydix.Points.knn, raydix.Points.radius
+
+    def seen_knn(self, *arguments, max_distance=np.inf, **options):
+        reached.append(max_distance)
+        return knn(self, *arguments, max_distance=max_distance, **options)
+
+    def seen_radius(self, queries, r, **options):
+        reached.append(np.max(r, initial=0))
+        return radius(self, queries, r, **options)
+
+    monkeypatch.setattr(raydix.Points, "knn", seen_knn)
+    monkeypatch.setattr(raydix.Points, "radius", seen_radius)
+    tree.query(rng.uniform(size=(50, 3)), 9, p=p, distance_upper_bound=0.1)
+    assert len(reached) > 1 and max(reached) < most
 
 
 @pytest.mark.parametrize("p", NORMS)
