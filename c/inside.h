@@ -97,7 +97,6 @@ static_assert(RAYDIX_HAS_NO_TAIL(raydix_trace_options, max_result_bytes));
 static_assert(RAYDIX_HAS_NO_TAIL(raydix_trace_options_d, max_result_bytes));
 static_assert(RAYDIX_HAS_NO_TAIL(raydix_closest_options, reserved));
 static_assert(RAYDIX_HAS_NO_TAIL(raydix_closest_options_d, threads));
-static_assert(RAYDIX_HAS_NO_TAIL(raydix_points_options, threads));
 #undef RAYDIX_HAS_NO_TAIL
 
 /// A caller's options over the defaults: as many bytes as the caller's version of the struct has.

@@ -5,12 +5,10 @@
 
 namespace raydix_c {
 
-raydix::PointQueryOptions query_options(const raydix_points_options* given) {
-    const auto asked = options_over(given, raydix_points_options RAYDIX_POINTS_OPTIONS);
-    return {.threads = asked.threads,
-            .sort = asked.sorted != 0,
-            .max_result_bytes = asked.max_result_bytes,
-            .max_distance = asked.max_distance};
+raydix::PointQueryOptions with_threads(int threads) {
+    raydix::PointQueryOptions options;
+    options.threads = threads;
+    return options;
 }
 
 template <class Scalar>
@@ -39,14 +37,14 @@ raydix_status size_of_points(const auto* index, std::size_t* size) {
 
 template <class Scalar>
 raydix_status knn(const auto* index, const Scalar* queries, std::size_t count, std::uint32_t k,
-                  std::uint32_t* indices, Scalar* distances, const raydix_points_options* options) {
+                  std::uint32_t* indices, Scalar* distances, int threads) {
     return guarded([&] {
         require(index, "index");
         if (k != 0) require_countable(count, k, "count * k");
         const std::size_t size = count * k;
         raydix::knn(index->index, points_at(queries, count, "queries"), k,
                     results_at<std::uint32_t>(indices, size, "indices"),
-                    results_at<Scalar>(distances, size, "distances"), query_options(options));
+                    results_at<Scalar>(distances, size, "distances"), with_threads(threads));
     });
 }
 
@@ -57,19 +55,20 @@ raydix_status count_points(const auto* index, const Scalar* queries, std::size_t
         require(index, "index");
         raydix::radius_count(index->index, points_at(queries, count, "queries"), radius,
                              results_at<std::uint32_t>(counts, count, "counts"),
-                             {.threads = threads});
+                             with_threads(threads));
     });
 }
 
 template <class Lists, class Scalar>
 raydix_status points_within(const auto* index, const Scalar* queries, std::size_t count,
-                            Scalar radius, Lists** lists, const raydix_points_options* options) {
+                            Scalar radius, bool sorted, int threads, Lists** lists) {
     return guarded([&] {
         require(index, "index");
         require(lists, "lists");
+        raydix::PointQueryOptions options = with_threads(threads);
+        options.sort = sorted;
         const auto asked = points_at(queries, count, "queries");
-        *lists =
-            new Lists{raydix::radius_search(index->index, asked, radius, query_options(options))};
+        *lists = new Lists{raydix::radius_search(index->index, asked, radius, options)};
     });
 }
 
@@ -112,15 +111,13 @@ raydix_status raydix_points_size_d(const raydix_points_d* index, size_t* size) {
 }
 
 raydix_status raydix_points_knn(const raydix_points* index, const float* queries, size_t count,
-                                uint32_t k, uint32_t* indices, float* distances,
-                                const raydix_points_options* options) {
-    return raydix_c::knn(index, queries, count, k, indices, distances, options);
+                                uint32_t k, uint32_t* indices, float* distances, int threads) {
+    return raydix_c::knn(index, queries, count, k, indices, distances, threads);
 }
 
 raydix_status raydix_points_knn_d(const raydix_points_d* index, const double* queries, size_t count,
-                                  uint32_t k, uint32_t* indices, double* distances,
-                                  const raydix_points_options* options) {
-    return raydix_c::knn(index, queries, count, k, indices, distances, options);
+                                  uint32_t k, uint32_t* indices, double* distances, int threads) {
+    return raydix_c::knn(index, queries, count, k, indices, distances, threads);
 }
 
 raydix_status raydix_points_count(const raydix_points* index, const float* queries, size_t count,
@@ -134,15 +131,14 @@ raydix_status raydix_points_count_d(const raydix_points_d* index, const double* 
 }
 
 raydix_status raydix_points_radius(const raydix_points* index, const float* queries, size_t count,
-                                   float radius, raydix_lists** lists,
-                                   const raydix_points_options* options) {
-    return raydix_c::points_within(index, queries, count, radius, lists, options);
+                                   float radius, int sorted, int threads, raydix_lists** lists) {
+    return raydix_c::points_within(index, queries, count, radius, sorted != 0, threads, lists);
 }
 
 raydix_status raydix_points_radius_d(const raydix_points_d* index, const double* queries,
-                                     size_t count, double radius, raydix_lists_d** lists,
-                                     const raydix_points_options* options) {
-    return raydix_c::points_within(index, queries, count, radius, lists, options);
+                                     size_t count, double radius, int sorted, int threads,
+                                     raydix_lists_d** lists) {
+    return raydix_c::points_within(index, queries, count, radius, sorted != 0, threads, lists);
 }
 
 void raydix_lists_destroy(raydix_lists* lists) { delete lists; }

@@ -298,25 +298,11 @@ RAYDIX_C_API raydix_status raydix_points_create(const float* points, size_t coun
 RAYDIX_C_API void raydix_points_destroy(raydix_points* index);
 /* Points in the index; those out of range are not. */
 RAYDIX_C_API raydix_status raydix_points_size(const raydix_points* index, size_t* size);
-
-/* In float and in double. */
-typedef struct raydix_points_options {
-    size_t struct_size;
-    double max_distance;       /* of raydix_points_knn: points farther away do not count */
-    uint64_t max_result_bytes; /* of raydix_points_radius; 0: half of the memory that is left */
-    int sorted; /* of raydix_points_radius. 1: rows by (squared distance, index). 0: by index */
-    int threads;
-} raydix_points_options;
-#define RAYDIX_POINTS_OPTIONS \
-    { sizeof(raydix_points_options), INFINITY, 0, 0, 0 }
-
-/* The k nearest of each query, by (squared distance, index): queries [3 * count] -> indices and
-   distances [count * k]. A row with fewer ends with RAYDIX_MISSING and INFINITY. Both arrays are
-   needed. */
+/* The k nearest of each query, by (distance, index): queries [3 * count] -> indices and distances
+   [count * k]. A row with fewer ends with RAYDIX_MISSING and INFINITY. Both arrays are needed. */
 RAYDIX_C_API raydix_status raydix_points_knn(const raydix_points* index, const float* queries,
                                              size_t count, uint32_t k, uint32_t* indices,
-                                             float* distances,
-                                             const raydix_points_options* options);
+                                             float* distances, int threads);
 /* How many points are within the radius of each query, the radius itself included: queries
    [3 * count] -> counts [count]. */
 RAYDIX_C_API raydix_status raydix_points_count(const raydix_points* index, const float* queries,
@@ -325,11 +311,11 @@ RAYDIX_C_API raydix_status raydix_points_count(const raydix_points* index, const
 
 /* Rows of any length: row i is [offsets[i], offsets[i + 1]) of indices and distances. */
 typedef struct raydix_lists raydix_lists;
-/* Which points are within the radius of each query. Too many for max_result_bytes:
-   RAYDIX_RESULT_TOO_LARGE, and no list. */
+/* Which points are within the radius of each query. sorted 1: rows by (distance, index), else by
+   index. */
 RAYDIX_C_API raydix_status raydix_points_radius(const raydix_points* index, const float* queries,
-                                                size_t count, float radius, raydix_lists** lists,
-                                                const raydix_points_options* options);
+                                                size_t count, float radius, int sorted, int threads,
+                                                raydix_lists** lists);
 RAYDIX_C_API void raydix_lists_destroy(raydix_lists* lists);
 /* The arrays, which belong to `lists` and live as long as it does. Each of the last four may be
    NULL: not asked for. rows: number of rows; offsets [rows + 1]. */

@@ -172,15 +172,14 @@ RAYDIX_C_API void raydix_points_destroy_d(raydix_points_d* index);
 RAYDIX_C_API raydix_status raydix_points_size_d(const raydix_points_d* index, size_t* size);
 RAYDIX_C_API raydix_status raydix_points_knn_d(const raydix_points_d* index, const double* queries,
                                                size_t count, uint32_t k, uint32_t* indices,
-                                               double* distances,
-                                               const raydix_points_options* options);
+                                               double* distances, int threads);
 RAYDIX_C_API raydix_status raydix_points_count_d(const raydix_points_d* index,
                                                  const double* queries, size_t count, double radius,
                                                  uint32_t* counts, int threads);
 RAYDIX_C_API raydix_status raydix_points_radius_d(const raydix_points_d* index,
                                                   const double* queries, size_t count,
-                                                  double radius, raydix_lists_d** lists,
-                                                  const raydix_points_options* options);
+                                                  double radius, int sorted, int threads,
+                                                  raydix_lists_d** lists);
 RAYDIX_C_API void raydix_lists_destroy_d(raydix_lists_d* lists);
 RAYDIX_C_API raydix_status raydix_lists_arrays_d(const raydix_lists_d* lists, size_t* rows,
                                                  const uint64_t** offsets, const uint32_t** indices,

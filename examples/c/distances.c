@@ -143,7 +143,6 @@ static void find_neighbours(void) {
     float line[3 * count];
     const float query[3] = {10.25f, 0, 0};
     raydix_points* index;
-    raydix_points_options options = RAYDIX_POINTS_OPTIONS;
     raydix_lists* lists;
     const uint64_t* offsets;
     const uint32_t* found;
@@ -155,13 +154,12 @@ static void find_neighbours(void) {
     for (i = 0; i < count; ++i) line[3 * i] = (float)i;
     CHECK(raydix_points_create(line, count, 0, &index));
     CHECK(raydix_points_size(index, &size));
-    CHECK(raydix_points_knn(index, query, 1, 3, nearest, distances, NULL));
+    CHECK(raydix_points_knn(index, query, 1, 3, nearest, distances, 0));
     EXPECT(size == count);
     EXPECT(nearest[0] == 10 && nearest[1] == 11 && nearest[2] == 9);
     EXPECT(distances[0] == 0.25f && distances[1] == 0.75f && distances[2] == 1.25f);
     CHECK(raydix_points_count(index, query, 1, 1.25f, &within, 0));
-    options.sorted = 1;
-    CHECK(raydix_points_radius(index, query, 1, 1.25f, &lists, &options));
+    CHECK(raydix_points_radius(index, query, 1, 1.25f, 1, 0, &lists));
     CHECK(raydix_lists_arrays(lists, &rows, &offsets, &found, &far));
     EXPECT(within == 3 && rows == 1 && offsets[0] == 0 && offsets[1] == 3);
     EXPECT(memcmp(found, nearest, sizeof nearest) == 0);

@@ -515,31 +515,16 @@ TEST(Answers, PointsInDouble) {
     const std::uint32_t k = 7;
     std::vector<std::uint32_t> ids(queries.size() * k), ids_cpp(ids);
     std::vector<double> far(ids.size()), far_cpp(ids.size());
-    ASSERT_OK(raydix_points_knn_d(index, &queries[0].x, queries.size(), k, ids.data(), far.data(),
-                                  nullptr));
+    ASSERT_OK(
+        raydix_points_knn_d(index, &queries[0].x, queries.size(), k, ids.data(), far.data(), 0));
     knn(cpp, queries, k, ids_cpp, far_cpp);
     EXPECT_EQ(ids, ids_cpp);
     EXPECT_EQ(far, far_cpp);
-    raydix_points_options options = RAYDIX_POINTS_OPTIONS;
-    options.max_distance = 0.06;
-    ASSERT_OK(raydix_points_knn_d(index, &queries[0].x, queries.size(), k, ids.data(), far.data(),
-                                  &options));
-    const std::uint64_t found =
-        knn(cpp, queries, k, ids_cpp, far_cpp, {.max_distance = 0.06}).found;
-    EXPECT_LT(found, ids.size());
-    EXPECT_GT(found, 0u);
-    EXPECT_EQ(ids, ids_cpp);
-    EXPECT_EQ(far, far_cpp);
-    options = RAYDIX_POINTS_OPTIONS;
-    options.sorted = 1;
-    options.max_result_bytes = 1000;
     raydix_lists_d* lists = nullptr;
-    EXPECT_EQ(raydix_points_radius_d(index, &queries[0].x, queries.size(), 0.1, &lists, &options),
-              RAYDIX_RESULT_TOO_LARGE);
-    EXPECT_EQ(lists, nullptr);
-    options.max_result_bytes = 0;
-    ASSERT_OK(raydix_points_radius_d(index, &queries[0].x, queries.size(), 0.1, &lists, &options));
-    const PointLists<double> expected = radius_search(cpp, queries, 0.1, {.sort = true});
+    ASSERT_OK(raydix_points_radius_d(index, &queries[0].x, queries.size(), 0.1, 1, 0, &lists));
+    PointQueryOptions sorted;
+    sorted.sort = true;
+    const PointLists<double> expected = radius_search(cpp, queries, 0.1, sorted);
     std::size_t rows = 0;
     const std::uint64_t* offsets = nullptr;
     const std::uint32_t* indices = nullptr;

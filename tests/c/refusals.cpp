@@ -137,19 +137,6 @@ TEST_F(Refusals, OptionsOutOfRangeOfOneRayToo) {
     expect_refused(raydix_scene_commit(scene, &commit), "reserved of the options is 1");
     raydix_closest_options near = RAYDIX_CLOSEST_OPTIONS;
     near.reserved = 1;
-    raydix_points_options points = RAYDIX_POINTS_OPTIONS;
-    points.max_distance = -1;
-    raydix_points* index = nullptr;
-    std::uint32_t id = 42;
-    float distance = 42;
-    ASSERT_EQ(raydix_points_create(corners.data(), 3, 0, &index), RAYDIX_OK);
-    expect_refused(raydix_points_knn(index, corners.data(), 1, 1, &id, &distance, &points),
-                   "max_distance is -1; it must be 0 or more");
-    points.struct_size += 1;
-    expect_refused(raydix_points_knn(index, corners.data(), 1, 1, &id, &distance, &points),
-                   "struct_size of the options is");
-    EXPECT_EQ(id, 42u);
-    raydix_points_destroy(index);
     raydix_closest_point point{};
     expect_refused(raydix_closest_points(scene, corners.data(), 1, &point, &near),
                    "reserved of the options is 1");
