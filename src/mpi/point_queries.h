@@ -180,7 +180,7 @@ public:
     [[nodiscard]] Question question(std::size_t i) const { return queries_[i]; }
 
     std::uint64_t answer_some(std::span<const Question> questions, std::uint64_t most, Bytes& out) {
-        return answer_in_chunks(questions, most, out, rows_.limit(),
+        return answer_in_chunks(questions, most, out,
                                 [&](std::span<const Question> chunk, std::uint64_t limit) {
                                     put_rows(region_.search(view_, chunk, limit), out);
                                 });

@@ -318,8 +318,7 @@ public:
     }
     std::uint64_t answer_some(std::span<const Question> rays, std::uint64_t most, Bytes& out) {
         return answer_in_chunks(
-            rays, most, out, rows_.limit(),
-            [&](std::span<const Question> chunk, std::uint64_t limit) {
+            rays, most, out, [&](std::span<const Question> chunk, std::uint64_t limit) {
                 const ArrivedRays<T> arrived(chunk);
                 BasicSceneTraceOptions<T> options = this->options_of(arrived);
                 options.max_result_bytes = limit;
