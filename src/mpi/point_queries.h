@@ -80,6 +80,9 @@ public:
         squared_nearest(view_.index, std::span<const Point>(points), most.data(), k_,
                         std::span(ids_), std::span(d2_), options);
     }
+    [[nodiscard]] std::uint64_t most_answer_bytes() const {
+        return sizeof(std::uint32_t) + std::uint64_t{k_} * (sizeof(std::uint64_t) + sizeof(T));
+    }
     void put_answer(std::size_t q, Bytes& out) const {
         const std::uint32_t* row = ids_.data() + q * k_;
         const auto found = static_cast<std::uint32_t>(std::find(row, row + k_, no_primitive) - row);

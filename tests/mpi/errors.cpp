@@ -191,6 +191,26 @@ TEST(ErrorsOverRanks, AnswersThatFillARoundAreGivenInSeveral) {
     EXPECT_GT(b.report.rounds, 1u);
 }
 
+TEST(ErrorsOverRanks, AnswersOfAFixedSizeFitIntoARound) {
+    // The questions of a rank fit into a round, their answers of 4 + 12 k bytes do not.
+    constexpr std::uint32_t k = 50, asked = 60;
+    const auto points = some_points(100);
+    const auto queries = std::span<const Vec3>(points).first(asked);
+    const DistributedPoints large(MPI_COMM_WORLD, points);
+    Options options;
+    options.exchange_bytes = 2000 * std::uint64_t(ranks());  // of each rank: 3 answers
+    const DistributedPoints small(MPI_COMM_WORLD, points, options);
+    const auto a = large.knn(queries, k), b = small.knn(queries, k);
+    EXPECT_TRUE(same_bits(a.indices, b.indices));
+    EXPECT_TRUE(same_bits(a.distances, b.distances));
+    EXPECT_GE(b.report.rounds, asked / 3 / unsigned(ranks()));
+    EXPECT_GT(b.report.rounds, a.report.rounds);
+    // No rank took in more than it may, so all of them together did not, in either direction.
+    std::uint64_t bytes = b.report.traffic.bytes;
+    MPI_Allreduce(MPI_IN_PLACE, &bytes, 1, MPI_UINT64_T, MPI_SUM, MPI_COMM_WORLD);
+    EXPECT_LE(bytes, 2 * b.report.rounds * options.exchange_bytes * unsigned(ranks()));
+}
+
 TEST(CurveOverRanks, RanksHoldEquallyManyAndQueriesReachFew) {
     const auto points = some_points(4000);  // the same on all ranks: each is there `ranks` times
     const DistributedPoints made(MPI_COMM_WORLD, points);
