@@ -571,6 +571,6 @@ class DistributedScene(_Distributed):
         if self._core is None:
             return "<raydix.mpi.DistributedScene: freed>"
         return (
-            f"<raydix.mpi.DistributedScene: {self.holding['size']:,} triangles of "
+            f"<raydix.mpi.DistributedScene: {self.holding['size']:,} elements of "
             f"{self._comm.size} ranks, {self.dtype}>"
         )

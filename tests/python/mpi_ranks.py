@@ -188,7 +188,7 @@ def check_one_mesh(dtype, partition, division):
     with raydix.mpi.DistributedScene(
         COMM, given, one_geometry=True, precision=dtype, partition=partition, threads=1
     ) as spread:
-        assert spread.holding["size"] == 24 and "24 triangles" in repr(spread)
+        assert spread.holding["size"] == 24 and "24 elements" in repr(spread)
         compare_closest(spread, whole, asked)
         same(spread.contains(asked), whole.contains(asked, rule="parity"), "contains")
         found = spread.trace(asked, np.ones_like(asked))
