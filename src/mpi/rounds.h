@@ -72,8 +72,7 @@ public:
             const Arrived questions = exchange(comm_, out_, limits_.message_bytes);
             std::vector<Bytes> replies(std::size_t(comm_.size()));
             compute(error, [&] { answer_all(questions, replies, report); });
-            if (error) replies.assign(std::size_t(comm_.size()), {});
-            const Arrived answers = exchange(comm_, replies, limits_.message_bytes);
+            const Arrived answers = exchange(comm_, replies, limits_.message_bytes, error);
             compute(error, [&] {
                 take_all(answers);
                 select();
