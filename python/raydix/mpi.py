@@ -380,9 +380,8 @@ class DistributedScene(_Distributed):
         - ``(vertices, faces)``, a mesh as arrays; or an object with `vertices` and `faces`, but no
           path;
         - ``(scene, transform)``, an instance of a `raydix.Scene` as its last commit left it. It
-          stays on this rank, and may hold whatever a scene holds. It is kept as long as this
-          object. Changes of its meshes are not seen, and must not come before `closest_points`. The
-          transform is as in `raydix.Scene.add`, (3, 4) or (4, 4);
+          stays on this rank, and may hold whatever a scene holds. Later changes of it are not seen.
+          The transform is as in `raydix.Scene.add`, (3, 4) or (4, 4);
         - ``{"spheres": (centers, radii)}``, ``{"capsules": (starts, ends, radii)}`` or ``{"points":
           (points, radius)}``, as `raydix.Scene.add_spheres` and others take them. They stay on this
           rank;
@@ -433,8 +432,6 @@ class DistributedScene(_Distributed):
                     "geometries: expected a list of meshes and instances, "
                     f"given {type(geometries).__name__}"
                 )
-            # Closest points read the arrays of scenes that instances place.
-            self._placed: list[Scene] = []
             given = [self._given(one, f"geometries[{i}]") for i, one in enumerate(geometries)]
         made = _mpi.DistributedSceneF if self.dtype == FLOAT32 else _mpi.DistributedSceneD
         self._core = made(comm.py2f(), given, options, bool(one_geometry), level)
@@ -479,8 +476,7 @@ class DistributedScene(_Distributed):
         places, is_one = transforms(second, self.dtype)
         if not is_one:
             raise ValueError(f"{name}: expected one transform, given {len(places)}")
-        self._placed.append(first)
-        return "instance", mask, first._core.traced(), places
+        return "instance", mask, first._core.lend(), places
 
     def _rays(
         self, rays: Any, directions: Any, tmin: Any, tmax: Any, mask: Any, masks: Any
@@ -575,6 +571,6 @@ class DistributedScene(_Distributed):
         if self._core is None:
             return "<raydix.mpi.DistributedScene: freed>"
         return (
-            f"<raydix.mpi.DistributedScene: {self.holding['size']:,} triangles of "
+            f"<raydix.mpi.DistributedScene: {self.holding['size']:,} elements of "
             f"{self._comm.size} ranks, {self.dtype}>"
         )

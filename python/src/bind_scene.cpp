@@ -478,6 +478,18 @@ int hit_of(Scene& scene, nb::handle origin, nb::handle direction, nb::handle row
     return dimensions;
 }
 
+/// A LendScene in a capsule. What can go wrong with the scene is thrown here.
+template <class Scene>
+nb::object lend(std::shared_ptr<Scene> scene) {
+    using Lend = LendScene<Scalar<Scene>>;
+    static_cast<void>(reading(*scene, [&] { return &scene->traced(); }));
+    auto function = std::make_unique<Lend>([scene = std::move(scene)] { return scene->lend(); });
+    nb::capsule made(function.get(), scene_name<Scalar<Scene>>,
+                     [](void* lend) noexcept { delete static_cast<Lend*>(lend); });
+    static_cast<void>(function.release());
+    return made;
+}
+
 /// What both types of scenes answer.
 template <class Scene>
 void bind_asking(nb::class_<Scene>& scene) {
@@ -508,10 +520,7 @@ void bind_asking(nb::class_<Scene>& scene) {
     scene.def("attributes", &attributes<Scene>, nb::arg("id"));
     scene.def("attribute", &attribute<Scene>, nb::arg("name"), nb::arg("path").none() = nb::none(),
               nb::arg("id") = 0);
-    scene.def("traced", [](Scene& self) -> nb::object {
-        return nb::capsule(reading(self, [&] { return &self.traced(); }),
-                           scene_name<Scalar<Scene>>);
-    });
+    scene.def("lend", &lend<Scene>);
     scene.def("hit_of", &hit_of<Scene>, nb::arg("origin").none(), nb::arg("direction").none(),
               nb::arg("row"));
     scene.def("positions", &positions_of<Scene>, nb::arg("hits").noconvert(),

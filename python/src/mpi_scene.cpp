@@ -8,6 +8,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -24,7 +25,11 @@ namespace {
 
 template <class T>
 struct SceneCalls {
-    using Scene = mpi::BasicDistributedScene<T>;
+    /// With what the meshes of placed scenes lie in.
+    struct Scene : mpi::BasicDistributedScene<T> {
+        using mpi::BasicDistributedScene<T>::BasicDistributedScene;
+        std::vector<std::shared_ptr<const void>> arrays;
+    };
     using Geometry = typename Scene::Geometry;
     using Point = typename Scene::Point;
     using PointRows = In<T, nb::shape<-1, 3>>;
@@ -38,16 +43,18 @@ struct SceneCalls {
         std::vector<PointRows> vertices;
         std::vector<FacesIn> faces;
         std::vector<ShapeRows> shapes;
+        std::vector<std::pair<std::size_t, LendScene<T>>> placed;  // of which geometry
 
-        /// What it is, the mask, and: vertices and faces; what traced() of a scene's core gave and
-        /// a transform; rows of spheres or capsules.
+        /// What it is, the mask, and: vertices and faces; what lend() of a scene's core gave and a
+        /// transform; rows of spheres or capsules.
         void add(const nb::tuple& one) {
             const auto kind = nb::cast<std::string>(one[0]);
             Geometry& geometry = geometries.emplace_back();
             geometry.mask = nb::cast<std::uint32_t>(one[1]);
             if (kind == "instance") {
-                geometry.scene = static_cast<const BasicScene<T>*>(
-                    nb::cast<nb::capsule>(one[2]).data(scene_name<T>));
+                placed.emplace_back(geometries.size() - 1,
+                                    *static_cast<const LendScene<T>*>(
+                                        nb::cast<nb::capsule>(one[2]).data(scene_name<T>)));
                 geometry.transform = rows<BasicTransform<T>>(nb::cast<TransformRow>(one[3]))[0];
             } else if (kind == "mesh") {
                 vertices.push_back(nb::cast<PointRows>(one[2]));
@@ -60,6 +67,13 @@ struct SceneCalls {
                 else
                     geometry.spheres = shapes_of<BasicSphere<T>>(shapes.back());
             }
+        }
+        /// Without the interpreter's lock: placed scenes, as long as the result lives.
+        [[nodiscard]] std::vector<LentScene<T>> borrow() {
+            std::vector<LentScene<T>> lent;
+            for (const auto& [at, lend] : placed)
+                geometries[at].scene = lent.emplace_back(lend()).scene;
+            return lent;
         }
         template <class Shape>
         static std::span<const Shape> shapes_of(const ShapeRows& given) {
@@ -78,8 +92,12 @@ struct SceneCalls {
         Given given;
         for (const nb::handle one : geometries) given.add(nb::cast<nb::tuple>(one));
         const nb::gil_scoped_release released;
+        const std::vector<LentScene<T>> lent = given.borrow();
+        std::vector<std::shared_ptr<const void>> arrays;
+        for (const LentScene<T>& one : lent) arrays.push_back(one.arrays);
         new (self)
             Scene(communicator_of(comm), std::span<const Geometry>(given.geometries), options);
+        self->arrays = std::move(arrays);
     }
 
     static mpi::BasicTraceOptions<T> trace_options(std::uint32_t mask, const Masks& masks) {

@@ -468,6 +468,23 @@ const typename Names::Scene& BasicSceneTrees<Names>::traced() {
 }
 
 template <class Names>
+LentScene<typename Names::Scalar> BasicSceneTrees<Names>::lend() {
+    const auto locks = std::make_shared<std::vector<Reading>>();
+    std::set<const BasicSceneTrees*> known;
+    read_all(known, *locks);
+    return {&traced(), kept_, locks};
+}
+
+template <class Names>
+void BasicSceneTrees<Names>::read_all(std::set<const BasicSceneTrees*>& known,
+                                      std::vector<Reading>& locks) const {
+    if (!known.insert(this).second) return;
+    locks.push_back(this->read());
+    for (const auto& [id, geometry] : geometries_)
+        if (geometry.scene != nullptr) geometry.scene->read_all(known, locks);
+}
+
+template <class Names>
 QueryCounts BasicSceneTrees<Names>::closest_points(std::span<const Point> queries,
                                                    std::span<typename Names::ClosestPoint> results,
                                                    typename Names::Scalar max_distance,

@@ -20,6 +20,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <type_traits>
@@ -29,6 +30,7 @@
 #include "array_filter.h"
 #include "attributes.h"
 #include "locks.h"
+#include "scene_handle.h"
 
 namespace raydix::python {
 
@@ -230,6 +232,8 @@ public:
         const std::string& name) const;
     /// As the last commit left it. Throws InputError, as its functions do, if there was none.
     [[nodiscard]] const Scene& traced();
+    /// The same with its locks, for another module.
+    [[nodiscard]] LentScene<typename Names::Scalar> lend();
 
     using Point = typename Names::Point;
     QueryCounts closest_points(std::span<const Point> queries,
@@ -295,6 +299,8 @@ private:
     /// While writing, with the scenes that are placed held: of all geometries as they are.
     [[nodiscard]] std::shared_ptr<const Kept> keep() const;
     void look_for_mesh();
+    /// Of this scene and all that it places, each once, `known` aside.
+    void read_all(std::set<const BasicSceneTrees*>& known, std::vector<Reading>& locks) const;
 
     SceneOptions commits_;
     Scene scene_;

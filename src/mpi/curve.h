@@ -5,11 +5,13 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <exception>
 #include <limits>
 #include <numeric>
 #include <vector>
 
 #include "keys/morton.h"
+#include "mpi/agree.h"
 #include "mpi/communicator.h"
 #include "mpi/exchange.h"
 #include "mpi/rank_tree.h"
@@ -71,22 +73,32 @@ template <class Record>
                                                      std::vector<Record> records,
                                                      const std::vector<CurveKey>& keys,
                                                      std::uint64_t message_bytes) {
-    std::vector<std::uint32_t> order(keys.size());
-    std::iota(order.begin(), order.end(), 0u);
-    std::sort(order.begin(), order.end(),
-              [&](std::uint32_t a, std::uint32_t b) { return keys[a] < keys[b]; });
-    std::vector<CurveKey> sorted(keys.size());
-    for (std::size_t i = 0; i < order.size(); ++i) sorted[i] = keys[order[i]];
+    std::vector<std::uint32_t> order;
+    std::vector<CurveKey> sorted;
+    together(comm, [&] {
+        order.resize(keys.size());
+        std::iota(order.begin(), order.end(), 0u);
+        std::sort(order.begin(), order.end(),
+                  [&](std::uint32_t a, std::uint32_t b) { return keys[a] < keys[b]; });
+        sorted.resize(keys.size());
+        for (std::size_t i = 0; i < order.size(); ++i) sorted[i] = keys[order[i]];
+    });
     const std::vector<std::size_t> begins = split_curve(comm, sorted);
     std::vector<Bytes> out(std::size_t(comm.size()));
-    for (std::size_t r = 0; r < out.size(); ++r) {
-        out[r].reserve((begins[r + 1] - begins[r]) * sizeof(Record));
-        for (std::size_t i = begins[r]; i < begins[r + 1]; ++i) put(out[r], records[order[i]]);
-    }
+    std::exception_ptr error;
+    keep_error(error, [&] {
+        for (std::size_t r = 0; r < out.size(); ++r) {
+            out[r].reserve((begins[r + 1] - begins[r]) * sizeof(Record));
+            for (std::size_t i = begins[r]; i < begins[r + 1]; ++i) put(out[r], records[order[i]]);
+        }
+    });
     records = {};
-    const Arrived arrived = exchange(comm, out, message_bytes);
-    records.resize(arrived.all().size() / sizeof(Record));
-    if (!records.empty()) std::memcpy(records.data(), arrived.all().data(), arrived.all().size());
+    const Arrived arrived = exchange(comm, out, message_bytes, error);
+    together(comm, [&] {
+        const auto bytes = arrived.all();
+        records.resize(bytes.size() / sizeof(Record));
+        if (!records.empty()) std::memcpy(records.data(), bytes.data(), bytes.size());
+    });
     return records;
 }
 

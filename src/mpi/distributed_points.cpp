@@ -108,14 +108,17 @@ struct BasicDistributedPoints<Scalar>::State {
         records = partition_by_curve(comm, std::move(records), keys, options.message_bytes);
         std::vector<Point> held;
         std::vector<std::uint64_t> numbers;
-        clock.run([&] {
-            std::sort(records.begin(), records.end(),
-                      [](const Record& a, const Record& b) { return a.id < b.id; });
-            for (const Record& record : records) {
-                held.push_back(record.at);
-                numbers.push_back(record.id);
-            }
+        keep_error(error, [&] {
+            clock.run([&] {
+                std::sort(records.begin(), records.end(),
+                          [](const Record& a, const Record& b) { return a.id < b.id; });
+                for (const Record& record : records) {
+                    held.push_back(record.at);
+                    numbers.push_back(record.id);
+                }
+            });
         });
+        agree(comm, error);
         ids = GlobalIds(std::move(numbers));
         return held;
     }

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "mpi/agree.h"
+
 namespace raydix::mpi {
 namespace {
 
@@ -16,8 +18,8 @@ void each_piece(std::uint64_t size, std::uint64_t most_bytes, const Piece& piece
 
 }  // namespace
 
-Arrived exchange(const Communicator& comm, const std::vector<Bytes>& out,
-                 std::uint64_t most_bytes) {
+Arrived exchange(const Communicator& comm, const std::vector<Bytes>& out, std::uint64_t most_bytes,
+                 std::exception_ptr error) {
     const auto ranks = static_cast<std::size_t>(comm.size());
     const auto me = static_cast<std::size_t>(comm.rank());
     std::vector<std::uint64_t> sizes(ranks);
@@ -25,8 +27,21 @@ Arrived exchange(const Communicator& comm, const std::vector<Bytes>& out,
     sizes = comm.transpose(sizes);
     std::vector<std::uint64_t> starts(ranks + 1, 0);
     for (std::size_t r = 0; r < ranks; ++r) starts[r + 1] = starts[r] + sizes[r];
-    Bytes in(starts.back());
+    Bytes in;
     std::vector<MPI_Request> requests;
+    // All memory before the first message: a rank that gave up later would leave others waiting.
+    keep_error(error, [&] {
+        in.resize(starts.back());
+        std::size_t pieces = 0;
+        const auto count = [&](std::uint64_t, int) { ++pieces; };
+        for (std::size_t r = 0; r < ranks; ++r) {
+            if (r == me) continue;
+            each_piece(sizes[r], most_bytes, count);
+            each_piece(out[r].size(), most_bytes, count);
+        }
+        requests.reserve(pieces);
+    });
+    agree(comm, error);
     for (std::size_t r = 0; r < ranks; ++r) {
         if (r == me) continue;
         each_piece(sizes[r], most_bytes, [&](std::uint64_t at, int size) {

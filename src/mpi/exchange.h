@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <exception>
 #include <span>
 #include <type_traits>
 #include <vector>
@@ -58,8 +59,9 @@ private:
 };
 
 /// Collective. out [ranks] -> what they sent to this one. No message is longer than `most_bytes`;
-/// what a rank sends to itself is copied and not counted.
+/// what a rank sends to itself is copied and not counted. `error`: what already went wrong here.
+/// An error of any rank is thrown on all before data is sent; so is lack of memory for what comes.
 [[nodiscard]] Arrived exchange(const Communicator& comm, const std::vector<Bytes>& out,
-                               std::uint64_t most_bytes);
+                               std::uint64_t most_bytes, std::exception_ptr error = nullptr);
 
 }  // namespace raydix::mpi

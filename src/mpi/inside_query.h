@@ -78,6 +78,7 @@ public:
         bits_.assign(points.size(), 0);
         with_threads(threads_, [&] { add_crossings(triangles_, points, bits_); });
     }
+    [[nodiscard]] static std::uint64_t most_answer_bytes() { return sizeof(std::uint8_t); }
     void put_answer(std::size_t q, Bytes& out) const { put(out, bits_[q]); }
     void take(std::size_t i, Reader& reader) {
         join(answers_.values[i], reader.take<std::uint8_t>());

@@ -80,6 +80,9 @@ public:
         squared_nearest(view_.index, std::span<const Point>(points), most.data(), k_,
                         std::span(ids_), std::span(d2_), options);
     }
+    [[nodiscard]] std::uint64_t most_answer_bytes() const {
+        return sizeof(std::uint32_t) + std::uint64_t{k_} * (sizeof(std::uint64_t) + sizeof(T));
+    }
     void put_answer(std::size_t q, Bytes& out) const {
         const std::uint32_t* row = ids_.data() + q * k_;
         const auto found = static_cast<std::uint32_t>(std::find(row, row + k_, no_primitive) - row);
@@ -180,7 +183,7 @@ public:
     [[nodiscard]] Question question(std::size_t i) const { return queries_[i]; }
 
     std::uint64_t answer_some(std::span<const Question> questions, std::uint64_t most, Bytes& out) {
-        return answer_in_chunks(questions, most, out, rows_.limit(),
+        return answer_in_chunks(questions, most, out,
                                 [&](std::span<const Question> chunk, std::uint64_t limit) {
                                     put_rows(region_.search(view_, chunk, limit), out);
                                 });

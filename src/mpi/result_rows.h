@@ -30,13 +30,9 @@ class RowStore {
 public:
     RowStore(const char* what, std::size_t queries, std::uint64_t max_result_bytes)
         : budget_(what, max_result_bytes),
-          max_result_bytes_(max_result_bytes),
           queries_(queries),
           rows_(BudgetAllocator<Row>(&budget_)),
           parts_(BudgetAllocator<Part>(&budget_)) {}
-
-    /// max_result_bytes, as the caller gave it.
-    [[nodiscard]] std::uint64_t limit() const { return max_result_bytes_; }
 
     /// A count, and so many rows.
     void take(std::size_t query, Reader& reader) {
@@ -81,18 +77,18 @@ private:
     };
 
     ResultBudget budget_;
-    std::uint64_t max_result_bytes_;
     std::size_t queries_;
     BudgetVector<Row> rows_;
     BudgetVector<Part> parts_;
 };
 
 /// Answers questions by search(chunk, limit) until `out` holds more than `most` bytes; at least
-/// one. A chunk whose rows would not fit into what is left of `most` is halved; a single question
-/// may take `limit` (0: half of what is left to the process). Returns how many were answered.
+/// one. A chunk whose rows would not fit into what is left of `most` is halved. The limit of a
+/// single question is 0, half of what is left to the process: how long a result may be is for the
+/// rank to say that asked. Returns how many were answered.
 template <class Question, class Search>
 std::uint64_t answer_in_chunks(std::span<const Question> questions, std::uint64_t most,
-                               const Bytes& out, std::uint64_t limit, const Search& search) {
+                               const Bytes& out, const Search& search) {
     constexpr std::size_t most_in_chunk = 1024;
     // What a search of one chunk may hold apart from rows.
     constexpr std::uint64_t least_room = std::uint64_t{1} << 20;
@@ -102,7 +98,7 @@ std::uint64_t answer_in_chunks(std::span<const Question> questions, std::uint64_
         try {
             search(questions.subspan(done, size),
                    size == 1
-                       ? limit
+                       ? 0
                        : std::max(most - std::min<std::uint64_t>(most, out.size()), least_room));
             done += size;
         } catch (const ResultTooLarge&) {

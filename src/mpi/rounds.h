@@ -12,6 +12,7 @@
 //   question(i)
 //   answer(questions)            answers questions, of all ranks together, and keeps the answers
 //   put_answer(q, out)           writes the one of question q
+//   most_answer_bytes()          that it writes for a question
 // or, where answers have any length,
 //   answer_some(questions, most, out)  answers questions of one rank, at least one, and stops after
 //                                `most` bytes; returns how many
@@ -44,6 +45,7 @@ class Rounds {
     static constexpr bool is_of_any_length = requires(Kind kind, Bytes out) {
         kind.answer_some(std::span<const Question>(), std::uint64_t{}, out);
     };
+    static constexpr std::uint64_t reply_head = sizeof(std::uint64_t);  // how many are answered
 
 public:
     Rounds(const Communicator& comm, Kind& kind, const RoundLimits& limits, ComputeClock& clock)
@@ -52,7 +54,7 @@ public:
           limits_(limits),
           clock_(clock),
           share_(limits.exchange_bytes / std::uint64_t(comm.size())),
-          most_questions_(share_ / sizeof(Question)),
+          most_questions_(questions_within(kind, share_)),
           out_(std::size_t(comm.size())),
           sent_(std::size_t(comm.size())) {}
 
@@ -70,8 +72,7 @@ public:
             const Arrived questions = exchange(comm_, out_, limits_.message_bytes);
             std::vector<Bytes> replies(std::size_t(comm_.size()));
             compute(error, [&] { answer_all(questions, replies, report); });
-            if (error) replies.assign(std::size_t(comm_.size()), {});
-            const Arrived answers = exchange(comm_, replies, limits_.message_bytes);
+            const Arrived answers = exchange(comm_, replies, limits_.message_bytes, error);
             compute(error, [&] {
                 take_all(answers);
                 select();
@@ -90,6 +91,14 @@ private:
         std::size_t query;
         std::uint32_t rank;
     };
+
+    /// Questions that fit into a rank's share of a round, and whose answers do. At least one.
+    static std::uint64_t questions_within(const Kind& kind, std::uint64_t share) {
+        std::uint64_t most = share / sizeof(Question);
+        if constexpr (!is_of_any_length)
+            most = std::min(most, (share - std::min(share, reply_head)) / kind.most_answer_bytes());
+        return std::max<std::uint64_t>(most, 1);
+    }
 
     template <class Body>
     void compute(std::exception_ptr& error, const Body& body) {

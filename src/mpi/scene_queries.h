@@ -223,6 +223,9 @@ public:
         raydix::trace(this->parts_.scene, arrived.rays(), std::span(found_),
                       this->options_of(arrived));
     }
+    [[nodiscard]] std::uint64_t most_answer_bytes() const {
+        return sizeof(std::uint8_t) + sizeof(Hit) + (normals_ != nullptr ? sizeof(Double3) : 0);
+    }
     void put_answer(std::size_t q, Bytes& out) const {
         const Hit hit = this->parts_.named(found_[q]);
         put(out, std::uint8_t{hit.hit()});
@@ -289,6 +292,7 @@ public:
         raydix::trace_any(this->parts_.scene, arrived.rays(), std::span(occluded_),
                           this->options_of(arrived));
     }
+    [[nodiscard]] static std::uint64_t most_answer_bytes() { return sizeof(std::uint8_t); }
     void put_answer(std::size_t q, Bytes& out) const { put(out, occluded_[q]); }
     void take(std::size_t i, Reader& reader) { answers_.values[i] |= reader.take<std::uint8_t>(); }
     void finish() {
@@ -318,8 +322,7 @@ public:
     }
     std::uint64_t answer_some(std::span<const Question> rays, std::uint64_t most, Bytes& out) {
         return answer_in_chunks(
-            rays, most, out, rows_.limit(),
-            [&](std::span<const Question> chunk, std::uint64_t limit) {
+            rays, most, out, [&](std::span<const Question> chunk, std::uint64_t limit) {
                 const ArrivedRays<T> arrived(chunk);
                 BasicSceneTraceOptions<T> options = this->options_of(arrived);
                 options.max_result_bytes = limit;
@@ -381,6 +384,9 @@ public:
                 },
                 64);
         });
+    }
+    [[nodiscard]] static std::uint64_t most_answer_bytes() {
+        return sizeof(std::uint8_t) + sizeof(Closest);
     }
     void put_answer(std::size_t q, Bytes& out) const {
         const BasicSceneClosestPoint<T>& one = found_[q];

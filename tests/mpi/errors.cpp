@@ -72,6 +72,35 @@ TEST(ErrorsOverRanks, ResultsThatAreTooLargeAreRefusedOnAll) {
     EXPECT_EQ(made.knn(points, 1).counts.found, 100u);
 }
 
+// Rank 0 asks one question. The others, which only answer, allow themselves next to nothing.
+constexpr std::uint64_t little = 100;
+
+TEST(ErrorsOverRanks, ARankThatOnlyAnswersRefusesNoRows) {
+    const bool asks = rank() == 0;
+    const auto points = some_points(100);
+    const DistributedPoints made(MPI_COMM_WORLD, points);
+    QueryOptions options;
+    options.max_result_bytes = asks ? 0 : little;
+    const auto mine = std::span<const Vec3>(points).first(asks ? 1 : 0);
+    EXPECT_EQ(made.radius(mine, 2.0f, options).counts.found, asks ? 100u * unsigned(ranks()) : 0u);
+}
+
+TEST(ErrorsOverRanks, ARankThatOnlyAnswersRefusesNoHits) {
+    const bool asks = rank() == 0;
+    Mesh layers;
+    for (std::uint32_t i = 0; i < 50; ++i) {
+        const float z = float(i);
+        layers.vertices.insert(layers.vertices.end(), {{0, 0, z}, {1, 0, z}, {0, 1, z}});
+        layers.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+    }
+    const MeshView view(layers);
+    const DistributedScene scene(MPI_COMM_WORLD, std::span(&view, 1));
+    TraceOptions of_rays;
+    of_rays.max_result_bytes = asks ? 0 : little;
+    const std::vector<Ray> rays(asks ? 1 : 0, Ray{{0.25f, 0.25f, -1}, 0, {0, 0, 1}, infinity});
+    EXPECT_EQ(scene.trace_all(rays, of_rays).counts.hits, asks ? 50u * unsigned(ranks()) : 0u);
+}
+
 TEST(ErrorsOverRanks, RanksThatDifferAreFound) {
     const auto points = some_points(10);
     const bool other = rank() == last() && ranks() > 1;
@@ -162,6 +191,26 @@ TEST(ErrorsOverRanks, AnswersThatFillARoundAreGivenInSeveral) {
     EXPECT_TRUE(same_bits(a.distances, b.distances));
     EXPECT_EQ(a.report.rounds, 1u);
     EXPECT_GT(b.report.rounds, 1u);
+}
+
+TEST(ErrorsOverRanks, AnswersOfAFixedSizeFitIntoARound) {
+    // The questions of a rank fit into a round, their answers of 4 + 12 k bytes do not.
+    constexpr std::uint32_t k = 50, asked = 60;
+    const auto points = some_points(100);
+    const auto queries = std::span<const Vec3>(points).first(asked);
+    const DistributedPoints large(MPI_COMM_WORLD, points);
+    Options options;
+    options.exchange_bytes = 2000 * std::uint64_t(ranks());  // of each rank: 3 answers
+    const DistributedPoints small(MPI_COMM_WORLD, points, options);
+    const auto a = large.knn(queries, k), b = small.knn(queries, k);
+    EXPECT_TRUE(same_bits(a.indices, b.indices));
+    EXPECT_TRUE(same_bits(a.distances, b.distances));
+    EXPECT_GE(b.report.rounds, asked / 3 / unsigned(ranks()));
+    EXPECT_GT(b.report.rounds, a.report.rounds);
+    // No rank took in more than it may, so all of them together did not, in either direction.
+    std::uint64_t bytes = b.report.traffic.bytes;
+    MPI_Allreduce(MPI_IN_PLACE, &bytes, 1, MPI_UINT64_T, MPI_SUM, MPI_COMM_WORLD);
+    EXPECT_LE(bytes, 2 * b.report.rounds * options.exchange_bytes * unsigned(ranks()));
 }
 
 TEST(CurveOverRanks, RanksHoldEquallyManyAndQueriesReachFew) {

@@ -1,5 +1,8 @@
 """One rank of mpi_test.py: every answer of raydix.mpi beside that of one process, bit for bit."""
 
+import itertools
+import threading
+
 import numpy as np
 from mpi4py import MPI
 from support import box_mesh, random_rays, random_triangles
@@ -185,11 +188,62 @@ def check_one_mesh(dtype, partition, division):
     with raydix.mpi.DistributedScene(
         COMM, given, one_geometry=True, precision=dtype, partition=partition, threads=1
     ) as spread:
-        assert spread.holding["size"] == 24 and "24 triangles" in repr(spread)
+        assert spread.holding["size"] == 24 and "24 elements" in repr(spread)
         compare_closest(spread, whole, asked)
         same(spread.contains(asked), whole.contains(asked, rule="parity"), "contains")
         found = spread.trace(asked, np.ones_like(asked))
         compare_hits(found, whole.intersect(asked, np.ones_like(asked)), "one mesh")
+
+
+def check_changes(dtype):
+    """What a scene shows that was changed after it was placed, or is changed meanwhile: what it showed then."""
+    rng = np.random.default_rng(2)
+    corners = rng.random((30000, 3)).astype(dtype)  # so many that memory goes back to the system
+    faces = np.arange(30000).reshape(-1, 3)
+    asked = rng.random((50, 3)).astype(dtype)
+    inner = raydix.Scene(corners, faces, precision=dtype, threads=1)
+    outer = raydix.Scene(precision=dtype, threads=1)
+    outer.add(inner, np.eye(4))
+    outer.commit()
+    place = np.eye(3, 4) + [0, 0, 0, RANK / 4]
+
+    def flat(height):
+        return np.tile([[0, 0, height], [1, 0, height], [0, 1, height]], (10000, 1)).astype(dtype)
+
+    def spread(scene):
+        return raydix.mpi.DistributedScene(COMM, [(scene, place)], precision=dtype, threads=1)
+
+    def answers(many):
+        closest = many.closest_points(asked)
+        return [*closest.values(), many.contains(asked), *many.trace(asked, asked).values()]
+
+    untouched = [answers(spread(scene)) for scene in (inner, outer)]
+    changed = [spread(scene) for scene in (inner, outer)]
+    inner.update(0, flat(0))
+    inner.commit()
+    outer.commit()
+    for many, expected in zip(changed, untouched, strict=True):
+        for found, value in zip(answers(many), expected, strict=True):
+            same(found, value, "after a change of what was placed")
+        many.free()
+
+    ended = threading.Event()
+
+    def change():
+        for height in itertools.cycle((1, 2)):
+            inner.update(0, flat(height))
+            inner.commit()
+            if ended.is_set():
+                return
+
+    changing = threading.Thread(target=change)
+    changing.start()
+    for _ in range(20):
+        with spread(inner) as many:
+            found = many.closest_points(place[:, 3] + [0.25, 0.25, 1])["point"]
+            assert (found * 4 % 1 == 0).all(), found
+    ended.set()
+    changing.join()
 
 
 def check_errors():
@@ -280,6 +334,7 @@ for dtype in (np.dtype(np.float32), np.dtype(np.float64)):
         check_one_mesh(dtype, partition, division)
     for partition in PARTITIONS:
         check_scene(dtype, partition)
+    check_changes(dtype)
 check_errors()
 KEPT = check_empty()
 COMM.Barrier()
