@@ -362,7 +362,7 @@ TEST(Simulate, WhatHalfOfTheLanesExecuteTakesTwice) {
         return 0.0;
     };
     EXPECT_EQ(limit(), 0.0);  // a machine that has none
-    for (OperationCost& cost : run.machine.costs) cost.half_rate = cost.instructions;
+    for (OperationCost& cost : run.machine.costs) cost.most = 0, cost.half_rate = cost.instructions;
     EXPECT_NEAR(limit(), 0.5, 1e-12);
     for (OperationCost& cost : run.machine.costs) cost.instructions = 4, cost.half_rate = 1;
     EXPECT_NEAR(limit(), 2.0, 1e-12);
