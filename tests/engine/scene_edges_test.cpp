@@ -361,6 +361,12 @@ TEST(Scene, OneRayOfACallerThatFlushesDenormals) {
 }
 #endif
 
+void expect_at(Vec3 found, Vec3 wanted) {
+    EXPECT_EQ(found.x, wanted.x);
+    EXPECT_EQ(found.y, wanted.y);
+    EXPECT_EQ(found.z, wanted.z);
+}
+
 TEST(SceneBounds, HoldTrianglesWithoutArea) {
     const Mesh good{"", {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}};
     const Mesh flat{"", {{5, 5, 5}, {6, 5, 5}, {7, 5, 5}}, {{0, 1, 2}}};
@@ -369,12 +375,12 @@ TEST(SceneBounds, HoldTrianglesWithoutArea) {
         both.add(good);
         both.add(flat);
         both.commit({.usage = usage});
-        EXPECT_EQ(both.bounds().hi, (Vec3{7, 5, 5}));
-        EXPECT_EQ(both.bounds().lo, (Vec3{0, 0, 0}));
+        expect_at(both.bounds().hi, {7, 5, 5});
+        expect_at(both.bounds().lo, {0, 0, 0});
         alone.add(flat);
         alone.commit({.usage = usage});
-        EXPECT_EQ(alone.bounds().lo, (Vec3{5, 5, 5}));
-        EXPECT_EQ(alone.bounds().hi, (Vec3{7, 5, 5}));
+        expect_at(alone.bounds().lo, {5, 5, 5});
+        expect_at(alone.bounds().hi, {7, 5, 5});
     }
 }
 

@@ -1,6 +1,7 @@
 // A process that is forked off while others are at work goes on alone.
 #include <gtest/gtest.h>
 #include <raydix/scene_queries.h>
+#include <raydix/thread_pool.h>
 #include <sys/wait.h>
 #include <unistd.h>
 

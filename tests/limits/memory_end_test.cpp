@@ -5,6 +5,7 @@
 #include <raydix/double.h>
 #include <raydix/refit.h>
 #include <raydix/scene.h>
+#include <raydix/user_geometry.h>
 
 #include <cstdint>
 #include <cstring>

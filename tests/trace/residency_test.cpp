@@ -6,7 +6,7 @@
 
 #include <vector>
 
-#include "support/rays.h"
+#include "support/ray_sets.h"
 #include "support/scenes.h"
 #include "support/support.h"
 
