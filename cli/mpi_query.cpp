@@ -42,16 +42,6 @@ struct WholeRows {
     std::vector<float> distances;
 };
 
-/// Collective. Offsets of all rows from those of each rank.
-std::vector<std::uint64_t> gather_offsets(std::span<const std::uint64_t> part) {
-    std::vector<std::uint64_t> lengths;
-    for (std::size_t i = 0; i + 1 < part.size(); ++i) lengths.push_back(part[i + 1] - part[i]);
-    std::vector<std::uint64_t> offsets{0};
-    for (const std::uint64_t length : gather(std::span<const std::uint64_t>(lengths)))
-        offsets.push_back(offsets.back() + length);
-    return offsets;
-}
-
 /// Numbers that count through the ranks against those of one index.
 template <class Expected>
 bool same_rows(const WholeRows& rows, const Expected& expected) {
@@ -72,14 +62,14 @@ bool same_rows(const WholeRows& rows, const Expected& expected) {
 
 bool same_points(const std::vector<Closest>& found,
                  const std::vector<SceneClosestPoint>& expected) {
-    if (found.size() != expected.size()) return false;
-    for (std::size_t i = 0; i < found.size(); ++i) {
-        const std::uint64_t prim = expected[i].found() ? expected[i].prim : mpi::no_global;
-        if (found[i].prim != prim ||
-            std::memcmp(&found[i].position, &expected[i].position, sizeof(Vec3)) != 0)
-            return false;
-    }
-    return true;
+    const auto same_bits = [](const auto& a, const auto& b) {
+        return std::memcmp(&a, &b, sizeof(a)) == 0;
+    };
+    return std::ranges::equal(found, expected, [&](const Closest& a, const SceneClosestPoint& b) {
+        return a.prim == (b.found() ? b.prim : mpi::no_global) && a.geometry == b.geometry &&
+               a.instance == b.instance && same_bits(a.position, b.position) &&
+               same_bits(a.distance, b.distance) && same_bits(a.u, b.u) && same_bits(a.v, b.v);
+    });
 }
 
 void save_closest(const std::vector<Closest>& found, const std::string& prefix) {

@@ -38,6 +38,15 @@ void receive_bytes(void* data, std::uint64_t bytes, int from) {
     });
 }
 
+std::vector<std::uint64_t> gather_offsets(std::span<const std::uint64_t> part) {
+    std::vector<std::uint64_t> lengths;
+    for (std::size_t i = 0; i + 1 < part.size(); ++i) lengths.push_back(part[i + 1] - part[i]);
+    std::vector<std::uint64_t> offsets{0};
+    for (const std::uint64_t length : gather(std::span<const std::uint64_t>(lengths)))
+        offsets.push_back(offsets.back() + length);
+    return offsets;
+}
+
 void throw_on_all(const std::string& error, bool is_usage) {
     int failed = error.empty() ? mpi_ranks() : mpi_rank();
     MPI_Allreduce(MPI_IN_PLACE, &failed, 1, MPI_INT, MPI_MIN, MPI_COMM_WORLD);

@@ -68,6 +68,9 @@ template <class T>
     return whole;
 }
 
+/// Collective. Offsets of the rows of all ranks, on rank 0, from those of each.
+[[nodiscard]] std::vector<std::uint64_t> gather_offsets(std::span<const std::uint64_t> part);
+
 /// Collective. What went wrong on any rank is an error on all: that of the lowest rank, which it
 /// names unless it is rank 0. A usage error stays one; others are InputErrors. Empty: nothing.
 void throw_on_all(const std::string& error, bool is_usage = false);

@@ -4,6 +4,7 @@
 #include <raydix/bvh.h>
 #include <raydix/rays.h>
 
+#include <algorithm>
 #include <cstring>
 #include <memory>
 
@@ -83,7 +84,8 @@ std::vector<Ray> rays_of(const TraceCommand& options, const Model& model) {
 template <class AnyHit>
 bool same_hit(const mpi::DistributedHit& hit, const AnyHit& expected) {
     const bool same_prim = expected.hit() ? hit.prim == expected.prim : hit.prim == mpi::no_global;
-    return same_prim && std::memcmp(&hit.t, &expected.t, sizeof(float)) == 0 &&
+    return same_prim && hit.geometry == expected.geometry && hit.instance == expected.instance &&
+           std::memcmp(&hit.t, &expected.t, sizeof(float)) == 0 &&
            std::memcmp(&hit.u, &expected.u, sizeof(float)) == 0 &&
            std::memcmp(&hit.v, &expected.v, sizeof(float)) == 0;
 }
@@ -168,10 +170,14 @@ void run_trace(const TraceCommand& options) {
     } else {
         const auto rows = scene.trace_all(mine);
         take(rows);
+        std::vector<std::uint64_t> offsets;
+        if (options.verify) offsets = gather_offsets(rows.offsets.view());
         finish(
             options, model, rays, [&] { return gather(rows.hits.view()); },
-            [](const Scene& alone, std::span<const Ray> all, const auto& hits) {
-                return same_hits(hits, trace_all(alone, all).hits);
+            [&](const Scene& alone, std::span<const Ray> all, const auto& hits) {
+                const auto expected = trace_all(alone, all);
+                return std::ranges::equal(offsets, expected.offsets) &&
+                       same_hits(hits, expected.hits);
             });
     }
     std::uint64_t sums[3] = {counts.rays, counts.hits, counts.invalid_rays};
