@@ -101,10 +101,7 @@ public:
         for (const auto& mesh : tree_->meshes) {
             report_.bytes += mesh->tree->stats().bytes;
             tree_->extents.emplace_back();
-            if (mesh->tree->empty()) {  // its bounds are zeros
-                unite_triangles(*mesh);
-                continue;
-            }
+            if (mesh->tree->empty()) continue;  // its bounds are zeros
             const Aabb& bounds = mesh->tree->arrays().bounds;
             tree_->extents.back() = extent_of_mesh(bounds);
             tree_->bounds = unite(tree_->bounds, bounds);
@@ -138,17 +135,6 @@ private:
             if (geometry->scene->tree != nullptr)
                 parts += 1 + static_cast<double>(geometry->scene->tree->placed.size());
         return parts;
-    }
-
-    /// The bounds grow by triangles without area, which rays never meet.
-    void unite_triangles(const MeshTree& tree) {
-        for (const std::uint32_t id : tree.ids) {
-            const MeshView& mesh = state_.geometries.at(id).mesh;
-            const TriangleSource source = source_of(mesh);
-            Aabb box;
-            for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i)
-                if (source.box(i, box)) tree_->bounds = unite(tree_->bounds, box);
-        }
     }
 
     /// A scene to place, and what leads to it.

@@ -361,28 +361,5 @@ TEST(Scene, OneRayOfACallerThatFlushesDenormals) {
 }
 #endif
 
-void expect_at(Vec3 found, Vec3 wanted) {
-    EXPECT_EQ(found.x, wanted.x);
-    EXPECT_EQ(found.y, wanted.y);
-    EXPECT_EQ(found.z, wanted.z);
-}
-
-TEST(SceneBounds, HoldTrianglesWithoutArea) {
-    const Mesh good{"", {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}};
-    const Mesh flat{"", {{5, 5, 5}, {6, 5, 5}, {7, 5, 5}}, {{0, 1, 2}}};
-    for (const Usage usage : {Usage::fixed, Usage::moving}) {
-        Scene both, alone;
-        both.add(good);
-        both.add(flat);
-        both.commit({.usage = usage});
-        expect_at(both.bounds().hi, {7, 5, 5});
-        expect_at(both.bounds().lo, {0, 0, 0});
-        alone.add(flat);
-        alone.commit({.usage = usage});
-        expect_at(alone.bounds().lo, {5, 5, 5});
-        expect_at(alone.bounds().hi, {7, 5, 5});
-    }
-}
-
 }  // namespace
 }  // namespace raydix

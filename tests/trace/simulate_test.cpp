@@ -419,12 +419,14 @@ TEST(Simulate, BothVersionsOfTheCodeGiveTheSameBits) {
         std::vector<TreeHit> first;
         std::vector<OpCounts> counts;
         std::vector<std::uint64_t> told;
+        const std::uint32_t entries = tree.arrays().stack_entries(name);
+        // The same memory, too: the observer is told of stacks that travel.
+        Buffer<std::byte> memory(
+            simulated_kernel(name, any_hit, width, SimulatorIsa::base)->warp_bytes(entries));
         for (const SimulatorIsa isa : {SimulatorIsa::base, SimulatorIsa::v3}) {
             const SimulatedKernel& kernel = *simulated_kernel(name, any_hit, width, isa);
             OpCounts tally{};
             ToldAccesses observer;
-            const std::uint32_t entries = tree.arrays().stack_entries(name);
-            Buffer<std::byte> memory(kernel.warp_bytes(entries));
             std::uint32_t next = 0;
             hits.assign(640, {});  // the same array, of which the observer is told
             const WarpJob job{scene_of(tree), {rays.rays().data(), hits.data(), 640, &next}};
