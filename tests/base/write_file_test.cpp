@@ -7,7 +7,6 @@
 #include <raydix/error.h>
 #include <raydix/files.h>
 #include <raydix/picture.h>
-#include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/sysmacros.h>
 #include <unistd.h>
@@ -21,6 +20,7 @@
 #include <vector>
 
 #include "support/message.h"
+#include "support/resource_limit.h"
 #include "support/support.h"
 
 namespace raydix {
@@ -42,22 +42,6 @@ std::size_t entries(const fs::path& folder) {
     return static_cast<std::size_t>(
         std::distance(fs::directory_iterator(folder), fs::directory_iterator()));
 }
-
-/// No file of this process grows past `bytes` during its lifetime.
-class FileLimit {
-public:
-    explicit FileLimit(rlim_t bytes) {
-        getrlimit(RLIMIT_FSIZE, &before_);
-        const rlimit now{bytes, before_.rlim_max};
-        setrlimit(RLIMIT_FSIZE, &now);
-    }
-    ~FileLimit() { setrlimit(RLIMIT_FSIZE, &before_); }
-    FileLimit(const FileLimit&) = delete;
-    FileLimit& operator=(const FileLimit&) = delete;
-
-private:
-    rlimit before_{};
-};
 
 class WriteFile : public ::testing::Test {
 protected:
@@ -180,7 +164,7 @@ TEST_F(WriteFile, AFullDiskLeavesTheOldFile) {
     const std::string large(100000, 'x');
     std::string messages[3];
     {
-        const FileLimit limit(50000);
+        const test::ResourceLimit limit(RLIMIT_FSIZE, 50000);
         messages[0] = message_of([&] { write(file, large); });
         messages[1] = message_of([&] { write(link, large); });
         messages[2] = message_of([&] { write(fresh, large); });
@@ -194,7 +178,7 @@ TEST_F(WriteFile, AFullDiskLeavesTheOldFile) {
     EXPECT_EQ(entries(here_), 2u);
     const std::vector<float> values(100000, 1.0f);
     {
-        const FileLimit limit(50000);
+        const test::ResourceLimit limit(RLIMIT_FSIZE, 50000);
         messages[0] = message_of([&] { save_array(fresh, values); });
     }
     EXPECT_EQ(messages[0], fresh.string() + reason);

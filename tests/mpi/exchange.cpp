@@ -1,7 +1,6 @@
 // Bytes from rank to rank where one of them has no memory for what comes, or an error already.
 #include "mpi/exchange.h"
 
-#include <sys/resource.h>
 #include <unistd.h>
 
 #include <fstream>
@@ -9,29 +8,19 @@
 
 #include "mpi/leaks.h"
 #include "mpi/ranks.h"
+#include "support/resource_limit.h"
 
 namespace raydix::mpi::test {
 namespace {
 
 constexpr std::size_t megabyte = std::size_t{1} << 20;
 
-/// While it lives, the process may have this much more memory than it has.
-class MoreMemory {
-public:
-    explicit MoreMemory(std::size_t bytes) {
-        std::size_t pages = 0;
-        std::ifstream("/proc/self/statm") >> pages;
-        getrlimit(RLIMIT_AS, &before_);
-        const rlimit now{pages * std::size_t(sysconf(_SC_PAGESIZE)) + bytes, before_.rlim_max};
-        setrlimit(RLIMIT_AS, &now);
-    }
-    ~MoreMemory() { setrlimit(RLIMIT_AS, &before_); }
-    MoreMemory(const MoreMemory&) = delete;
-    MoreMemory& operator=(const MoreMemory&) = delete;
-
-private:
-    rlimit before_{};
-};
+/// What the process has, and `more`.
+std::size_t bytes_and(std::size_t more) {
+    std::size_t pages = 0;
+    std::ifstream("/proc/self/statm") >> pages;
+    return pages * std::size_t(sysconf(_SC_PAGESIZE)) + more;
+}
 
 /// What each rank sends to the last one.
 std::vector<Bytes> to_last(std::size_t bytes) {
@@ -49,8 +38,8 @@ TEST(ExchangeOverRanks, ARankWithoutMemoryForWhatComesIsNamedOnAll) {
     const Communicator comm(MPI_COMM_WORLD);
     const auto out = to_last(64 * megabyte / std::size_t(ranks()));
     try {
-        std::optional<MoreMemory> little;
-        if (rank() == last()) little.emplace(16 * megabyte);
+        std::optional<raydix::test::ResourceLimit> little;
+        if (rank() == last()) little.emplace(RLIMIT_AS, bytes_and(16 * megabyte));
         (void)exchange(comm, out, megabyte);
         ADD_FAILURE() << "no error";
     } catch (const std::bad_alloc& error) {
