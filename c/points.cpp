@@ -5,6 +5,8 @@
 
 namespace raydix_c {
 
+constexpr float unlimited = std::numeric_limits<float>::infinity();
+
 raydix::PointQueryOptions with_threads(int threads) {
     raydix::PointQueryOptions options;
     options.threads = threads;
@@ -37,14 +39,16 @@ raydix_status size_of_points(const auto* index, std::size_t* size) {
 
 template <class Scalar>
 raydix_status knn(const auto* index, const Scalar* queries, std::size_t count, std::uint32_t k,
-                  std::uint32_t* indices, Scalar* distances, int threads) {
+                  Scalar max_distance, std::uint32_t* indices, Scalar* distances, int threads) {
     return guarded([&] {
         require(index, "index");
+        raydix::PointQueryOptions options = with_threads(threads);
+        options.max_distance = max_distance;
         if (k != 0) require_countable(count, k, "count * k");
         const std::size_t size = count * k;
         raydix::knn(index->index, points_at(queries, count, "queries"), k,
                     results_at<std::uint32_t>(indices, size, "indices"),
-                    results_at<Scalar>(distances, size, "distances"), with_threads(threads));
+                    results_at<Scalar>(distances, size, "distances"), options);
     });
 }
 
@@ -61,12 +65,14 @@ raydix_status count_points(const auto* index, const Scalar* queries, std::size_t
 
 template <class Lists, class Scalar>
 raydix_status points_within(const auto* index, const Scalar* queries, std::size_t count,
-                            Scalar radius, bool sorted, int threads, Lists** lists) {
+                            Scalar radius, bool sorted, std::uint64_t max_result_bytes, int threads,
+                            Lists** lists) {
     return guarded([&] {
         require(index, "index");
         require(lists, "lists");
         raydix::PointQueryOptions options = with_threads(threads);
         options.sort = sorted;
+        options.max_result_bytes = max_result_bytes;
         const auto asked = points_at(queries, count, "queries");
         *lists = new Lists{raydix::radius_search(index->index, asked, radius, options)};
     });
@@ -112,12 +118,26 @@ raydix_status raydix_points_size_d(const raydix_points_d* index, size_t* size) {
 
 raydix_status raydix_points_knn(const raydix_points* index, const float* queries, size_t count,
                                 uint32_t k, uint32_t* indices, float* distances, int threads) {
-    return raydix_c::knn(index, queries, count, k, indices, distances, threads);
+    return raydix_points_knn_within(index, queries, count, k, raydix_c::unlimited, indices,
+                                    distances, threads);
+}
+
+raydix_status raydix_points_knn_within(const raydix_points* index, const float* queries,
+                                       size_t count, uint32_t k, float max_distance,
+                                       uint32_t* indices, float* distances, int threads) {
+    return raydix_c::knn(index, queries, count, k, max_distance, indices, distances, threads);
 }
 
 raydix_status raydix_points_knn_d(const raydix_points_d* index, const double* queries, size_t count,
                                   uint32_t k, uint32_t* indices, double* distances, int threads) {
-    return raydix_c::knn(index, queries, count, k, indices, distances, threads);
+    return raydix_points_knn_within_d(index, queries, count, k, raydix_c::unlimited, indices,
+                                      distances, threads);
+}
+
+raydix_status raydix_points_knn_within_d(const raydix_points_d* index, const double* queries,
+                                         size_t count, uint32_t k, double max_distance,
+                                         uint32_t* indices, double* distances, int threads) {
+    return raydix_c::knn(index, queries, count, k, max_distance, indices, distances, threads);
 }
 
 raydix_status raydix_points_count(const raydix_points* index, const float* queries, size_t count,
@@ -132,13 +152,29 @@ raydix_status raydix_points_count_d(const raydix_points_d* index, const double* 
 
 raydix_status raydix_points_radius(const raydix_points* index, const float* queries, size_t count,
                                    float radius, int sorted, int threads, raydix_lists** lists) {
-    return raydix_c::points_within(index, queries, count, radius, sorted != 0, threads, lists);
+    return raydix_points_radius_limited(index, queries, count, radius, sorted, 0, threads, lists);
+}
+
+raydix_status raydix_points_radius_limited(const raydix_points* index, const float* queries,
+                                           size_t count, float radius, int sorted,
+                                           uint64_t max_result_bytes, int threads,
+                                           raydix_lists** lists) {
+    return raydix_c::points_within(index, queries, count, radius, sorted != 0, max_result_bytes,
+                                   threads, lists);
 }
 
 raydix_status raydix_points_radius_d(const raydix_points_d* index, const double* queries,
                                      size_t count, double radius, int sorted, int threads,
                                      raydix_lists_d** lists) {
-    return raydix_c::points_within(index, queries, count, radius, sorted != 0, threads, lists);
+    return raydix_points_radius_limited_d(index, queries, count, radius, sorted, 0, threads, lists);
+}
+
+raydix_status raydix_points_radius_limited_d(const raydix_points_d* index, const double* queries,
+                                             size_t count, double radius, int sorted,
+                                             uint64_t max_result_bytes, int threads,
+                                             raydix_lists_d** lists) {
+    return raydix_c::points_within(index, queries, count, radius, sorted != 0, max_result_bytes,
+                                   threads, lists);
 }
 
 void raydix_lists_destroy(raydix_lists* lists) { delete lists; }

@@ -24,6 +24,7 @@ void run_query(const QueryCommand& options) {
                                    "--signed-distance and --pairs");
     refuse(options.narrow && !options.pairs, "--narrow", "belongs to --pairs");
     refuse(!options.with_scene.empty() && !options.pairs, "--with", "belongs to --pairs");
+    refuse(options.max_distance && !options.k, "--max-distance", "belongs to --knn");
     if (of_points != 0) {
         refuse(!options.builder.empty(), "--builder",
                "belongs to --closest, --signed-distance and --pairs");
@@ -52,6 +53,11 @@ void add_kinds(CLI::App& command, QueryCommand& options) {
         ->transform(whole_number(1, 0xFFFFFFFE))
         ->type_name("K")
         ->group(group);
+    command
+        .add_option("--max-distance", options.max_distance,
+                    "--knn: only points within distance R; rows may then be short")
+        ->check(finite_number(true))
+        ->type_name("R");
     command.add_option("--radius", options.radius, "All points within distance R of each query")
         ->check(finite_number(true))
         ->type_name("R")

@@ -19,7 +19,7 @@ struct QueryCommand {
     std::string scene, queries_file, prefix, tree = "automatic";
     std::string with_scene, builder;
     std::optional<std::uint32_t> k;
-    std::optional<double> radius;
+    std::optional<double> radius, max_distance;
     bool box = false, sort = false, strict = false;
     bool closest = false, signed_distance = false, pairs = false, narrow = false;
     int repeat = 5;

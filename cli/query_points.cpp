@@ -82,9 +82,10 @@ QueryFigures answer_lists(const QueryCommand& options, const char* kind, const S
 }
 
 QueryFigures answer(const QueryCommand& options, const Points& index, const Model& scene) {
-    const PointQueryOptions how{.threads = options.common.threads,
-                                .sort = options.sort,
-                                .max_result_bytes = options.max_result_bytes};
+    PointQueryOptions how{.threads = options.common.threads,
+                          .sort = options.sort,
+                          .max_result_bytes = options.max_result_bytes};
+    if (options.max_distance) how.max_distance = *options.max_distance;
     if (options.k) return answer_nearest(options, index, scene, how);
     if (options.radius) {
         const std::vector<Vec3> queries = load_queries(options, scene);
@@ -152,6 +153,7 @@ void run_point_query(const QueryCommand& options) {
     document["build"] = index_json(index, options.common.threads);
     Json query = query_json(answer(options, index, scene));
     if (options.k) query["k"] = *options.k;
+    if (options.max_distance) query["max_distance"] = static_cast<float>(*options.max_distance);
     if (options.radius) query["radius"] = static_cast<float>(*options.radius);
     document["query"] = Json::array({query});
     if (options.common.prints_tables()) {

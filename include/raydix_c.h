@@ -303,6 +303,11 @@ RAYDIX_C_API raydix_status raydix_points_size(const raydix_points* index, size_t
 RAYDIX_C_API raydix_status raydix_points_knn(const raydix_points* index, const float* queries,
                                              size_t count, uint32_t k, uint32_t* indices,
                                              float* distances, int threads);
+/* The same among the points within max_distance, that distance itself included. 0 or more. */
+RAYDIX_C_API raydix_status raydix_points_knn_within(const raydix_points* index,
+                                                    const float* queries, size_t count, uint32_t k,
+                                                    float max_distance, uint32_t* indices,
+                                                    float* distances, int threads);
 /* How many points are within the radius of each query, the radius itself included: queries
    [3 * count] -> counts [count]. */
 RAYDIX_C_API raydix_status raydix_points_count(const raydix_points* index, const float* queries,
@@ -316,6 +321,13 @@ typedef struct raydix_lists raydix_lists;
 RAYDIX_C_API raydix_status raydix_points_radius(const raydix_points* index, const float* queries,
                                                 size_t count, float radius, int sorted, int threads,
                                                 raydix_lists** lists);
+/* The same. A call that would take more than max_result_bytes: RAYDIX_RESULT_TOO_LARGE, and no
+   lists. 0: half of the memory that is left. */
+RAYDIX_C_API raydix_status raydix_points_radius_limited(const raydix_points* index,
+                                                        const float* queries, size_t count,
+                                                        float radius, int sorted,
+                                                        uint64_t max_result_bytes, int threads,
+                                                        raydix_lists** lists);
 RAYDIX_C_API void raydix_lists_destroy(raydix_lists* lists);
 /* The arrays, which belong to `lists` and live as long as it does. Each of the last four may be
    NULL: not asked for. rows: number of rows; offsets [rows + 1]. */

@@ -173,6 +173,11 @@ RAYDIX_C_API raydix_status raydix_points_size_d(const raydix_points_d* index, si
 RAYDIX_C_API raydix_status raydix_points_knn_d(const raydix_points_d* index, const double* queries,
                                                size_t count, uint32_t k, uint32_t* indices,
                                                double* distances, int threads);
+RAYDIX_C_API raydix_status raydix_points_knn_within_d(const raydix_points_d* index,
+                                                      const double* queries, size_t count,
+                                                      uint32_t k, double max_distance,
+                                                      uint32_t* indices, double* distances,
+                                                      int threads);
 RAYDIX_C_API raydix_status raydix_points_count_d(const raydix_points_d* index,
                                                  const double* queries, size_t count, double radius,
                                                  uint32_t* counts, int threads);
@@ -180,6 +185,11 @@ RAYDIX_C_API raydix_status raydix_points_radius_d(const raydix_points_d* index,
                                                   const double* queries, size_t count,
                                                   double radius, int sorted, int threads,
                                                   raydix_lists_d** lists);
+RAYDIX_C_API raydix_status raydix_points_radius_limited_d(const raydix_points_d* index,
+                                                          const double* queries, size_t count,
+                                                          double radius, int sorted,
+                                                          uint64_t max_result_bytes, int threads,
+                                                          raydix_lists_d** lists);
 RAYDIX_C_API void raydix_lists_destroy_d(raydix_lists_d* lists);
 RAYDIX_C_API raydix_status raydix_lists_arrays_d(const raydix_lists_d* lists, size_t* rows,
                                                  const uint64_t** offsets, const uint32_t** indices,

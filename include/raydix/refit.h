@@ -21,8 +21,8 @@ struct RefitQuality {
 class Refitter {
 public:
     /// Throws InputError for a tree that holds parts of triangles (Bvh::has_split_primitives): the
-    /// parts are not kept.
-    explicit Refitter(const Bvh& built);
+    /// parts are not kept, and if `threads` is not 0 to 1,024. 0: all the machine has.
+    explicit Refitter(const Bvh& built, int threads = 0);
 
     /// Gives the tree new corners, with any indices, for the same number of triangles in the same
     /// order; or new places for points. The hierarchy stays, and boxes are fitted to the new

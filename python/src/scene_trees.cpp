@@ -413,7 +413,7 @@ RefitQuality BasicSceneTrees<Names>::refit(Vertices vertices, int threads) {
     };
     RefitQuality quality;
     if (!moved.triangles->empty()) {
-        if (!refitter_) refitter_.emplace(this->bvh_locked());
+        if (!refitter_) refitter_.emplace(this->bvh_locked(), threads_for(threads));
         const bool had_nodes = !this->bvh_locked().empty();
         try {
             quality = refitter_->refit(*bvh_, moved.view(), threads_for(threads));

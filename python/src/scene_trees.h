@@ -38,7 +38,7 @@ namespace raydix::python {
 class RefitterD {
 public:
     /// Takes no notes of the tree yet: the first refit tells how good it was.
-    explicit RefitterD(const BvhD&) {}
+    RefitterD(const BvhD&, int) {}
 
     /// As raydix::refit.
     RefitQuality refit(BvhD& bvh, const MeshViewD& mesh, int threads);

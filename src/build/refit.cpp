@@ -67,7 +67,9 @@ void require_indices(const MeshView& mesh) {
                          std::to_string(mesh.vertices.size()) + " vertices");
 }
 
-double cost_of(const Bvh& bvh) { return tree_stats(bvh, {.with_hash = false}).sah.value_or(0.0); }
+double cost_of(const Bvh& bvh, int threads) {
+    return tree_stats(bvh, {.with_hash = false, .threads = threads}).sah.value_or(0.0);
+}
 
 /// Arrays of a tree from a file may lie in read-only memory.
 template <class T>
@@ -103,7 +105,9 @@ RefitQuality quality_of(double sah, double sah_at_build) {
 
 }  // namespace
 
-Refitter::Refitter(const Bvh& built) : sah_at_build_(cost_of(built)) { require_whole(built); }
+Refitter::Refitter(const Bvh& built, int threads) : sah_at_build_(cost_of(built, threads)) {
+    require_whole(built);
+}
 
 RefitQuality Refitter::refit(Bvh& bvh, const MeshView& mesh, int threads) const {
     const FloatEnvironment plain;

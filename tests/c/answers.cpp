@@ -7,6 +7,7 @@
 #include <raydix_c.h>
 #include <raydix_c_double.h>
 
+#include <algorithm>
 #include <array>
 #include <cstring>
 #include <fstream>
@@ -520,7 +521,17 @@ TEST(Answers, PointsInDouble) {
     knn(cpp, queries, k, ids_cpp, far_cpp);
     EXPECT_EQ(ids, ids_cpp);
     EXPECT_EQ(far, far_cpp);
+    ASSERT_OK(raydix_points_knn_within_d(index, &queries[0].x, queries.size(), k, 0.05, ids.data(),
+                                         far.data(), 0));
+    knn(cpp, queries, k, ids_cpp, far_cpp, {.max_distance = 0.05});
+    EXPECT_EQ(ids, ids_cpp);
+    EXPECT_EQ(far, far_cpp);
+    EXPECT_GT(std::ranges::count(ids, no_primitive), 0);
     raydix_lists_d* lists = nullptr;
+    EXPECT_EQ(
+        raydix_points_radius_limited_d(index, &queries[0].x, queries.size(), 0.1, 1, 16, 0, &lists),
+        RAYDIX_RESULT_TOO_LARGE);
+    EXPECT_EQ(lists, nullptr);
     ASSERT_OK(raydix_points_radius_d(index, &queries[0].x, queries.size(), 0.1, 1, 0, &lists));
     PointQueryOptions sorted;
     sorted.sort = true;

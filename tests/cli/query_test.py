@@ -89,6 +89,20 @@ class Query(ProgramTest):
                 self.assertGreater(entry["mqueries_per_s"]["median"], 0)
                 self.assertEqual((document["build"]["points"], document["build"]["left_out"]), (341, 2))
 
+    def test_knn_within_a_distance(self):
+        k, r2 = 8, f32(f32(0.25) * f32(0.25))
+        document = self.document("query", self.cloud, "--knn", str(k), "--max-distance", "0.25", "--queries", self.file,
+                                 "--out", "near", "--repeat", "0")
+        indices = values(self.folder / "near.indices.npy", "I", k)
+        short = 0
+        for q, query in enumerate(self.queries):
+            wanted = [i for d2, i in by_distance(self.points, query) if d2 <= r2][:k]
+            self.assertEqual(list(indices[q * k:q * k + k]), wanted + [MISS] * (k - len(wanted)), q)
+            short += len(wanted) < k
+        self.assertGreater(short, 0)
+        self.assertEqual(document["query"][0]["max_distance"], 0.25)
+        self.fail_with_usage("query", self.cloud, "--radius", "1", "--max-distance", "1", names=["--max-distance"])
+
     def test_radius(self):
         for radius in (0, 0.25, 1e30):
             for sort in (False, True):
