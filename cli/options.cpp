@@ -333,7 +333,9 @@ void require_cameras(const Model& scene) {
     if (!scene.cameras_fault.empty()) throw InputError(scene.cameras_fault);
 }
 
-std::string reason_about(const std::string& scene, const std::string& reason) {
+std::string reason_about(const std::string& scene, const std::string& reason,
+                         const std::string& other) {
+    if (!other.empty() && reason.starts_with(other + ": ")) return reason;
     const std::string name = std::filesystem::path(scene).filename().string();
     if (reason.starts_with(scene + ": ")) return reason;
     if (!name.empty() && reason.starts_with(name + ": ")) return scene + reason.substr(name.size());

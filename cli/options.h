@@ -106,17 +106,18 @@ void refuse_device(const TreeOptions& tree);
 void add_result_limit(CLI::App& command, std::uint64_t& max_result_bytes);
 
 /// `reason` behind the scene that the user named, which it may name already, with its folder or
-/// without.
-[[nodiscard]] std::string reason_about(const std::string& scene, const std::string& reason);
+/// without. A reason that begins with `other`, another file that the user named, stays as it is.
+[[nodiscard]] std::string reason_about(const std::string& scene, const std::string& reason,
+                                       const std::string& other = {});
 
 /// Runs `work`; puts the scene that the user named before what the library has to say about its
 /// geometry.
 template <class Work>
-auto about(const std::string& scene, const Work& work) {
+auto about(const std::string& scene, const Work& work, const std::string& other = {}) {
     try {
         return work();
     } catch (const InputError& error) {
-        throw InputError(reason_about(scene, error.what()));
+        throw InputError(reason_about(scene, error.what(), other));
     }
 }
 

@@ -150,11 +150,14 @@ void run_mesh_query(const QueryCommand& options) {
     document["scene"] = scene_json(tree.scene);
     document["load_ms"] = tree.scene.load_ms;
     document["build"] = build_json(tree.bvh, tree_stats(tree.bvh, {.with_hash = false}), {});
-    const QueryFigures figures = about(options.scene, [&] {
-        return options.closest           ? answer_closest(options, tree)
-               : options.signed_distance ? signed_of_tree(options, tree, document)
-                                         : answer_pairs(options, tree);
-    });
+    const QueryFigures figures = about(
+        options.scene,
+        [&] {
+            return options.closest           ? answer_closest(options, tree)
+                   : options.signed_distance ? signed_of_tree(options, tree, document)
+                                             : answer_pairs(options, tree);
+        },
+        options.queries_file);
     document["query"] = Json::array({query_json(figures)});
     tell_left_out(document, tree.bvh.left_out(), options.common);
     if (options.common.prints_tables()) {

@@ -164,11 +164,14 @@ void run_scene_query(const QueryCommand& options, const QueriedScene& queried,
         {"device", "cpu"},
         {"threads", threads_at_work(options.common.threads)},
         {"ms", queried.commit_ms ? Json{{"total", *queried.commit_ms}} : Json(nullptr)}};
-    const QueryFigures figures = about(options.scene, [&] {
-        return options.closest           ? closest_of_scene(options, queried)
-               : options.signed_distance ? signed_of_scene(options, queried, document)
-                                         : pairs_of_scene(options, queried, other);
-    });
+    const QueryFigures figures = about(
+        options.scene,
+        [&] {
+            return options.closest           ? closest_of_scene(options, queried)
+                   : options.signed_distance ? signed_of_scene(options, queried, document)
+                                             : pairs_of_scene(options, queried, other);
+        },
+        options.queries_file);
     document["query"] = Json::array({query_json(figures)});
     tell_left_out(document, left_out_triangles(queried.scene), options.common);
     if (options.common.prints_tables()) {

@@ -12,7 +12,8 @@
 
 namespace example {
 
-inline constexpr std::uint32_t near_count = 16;
+inline constexpr std::uint32_t near_count = 16;   // neighbours of a point, for its plane
+inline constexpr std::uint32_t blend_count = 24;  // of a place, for its distance
 
 /// The eigenvector of the least eigenvalue of a symmetric matrix: cyclic Jacobi turns.
 inline Vec3 least_axis(double (&m)[3][3]) {
@@ -42,8 +43,9 @@ inline Vec3 least_axis(double (&m)[3][3]) {
 /// Points with normals that look outward.
 class Cloud {
 public:
+    /// Throws raydix::InputError for fewer points than a distance takes.
     explicit Cloud(std::vector<Vec3> given)
-        : points(std::move(given)),
+        : points(enough(std::move(given))),
           index_(raydix::build_points(points)),
           near_(raydix::knn(index_, points, near_count)) {
         normals.reserve(points.size());
@@ -61,7 +63,7 @@ public:
     /// Mean of the distances from the planes of the nearest points, the nearer the more: negative
     /// inside. The weights fall to 0 at the last of them, so that it is continuous.
     [[nodiscard]] std::vector<float> distances_at(std::span<const Vec3> places) const {
-        constexpr std::uint32_t k = 24;
+        constexpr std::uint32_t k = blend_count;
         const auto near = raydix::knn(index_, places, k);
         std::vector<float> out(places.size());
         for (std::size_t i = 0; i < places.size(); ++i) {
@@ -82,6 +84,13 @@ public:
     std::vector<Vec3> points, normals;
 
 private:
+    static std::vector<Vec3> enough(std::vector<Vec3> given) {
+        if (given.size() < blend_count)
+            throw raydix::InputError("a surface takes " + std::to_string(blend_count) +
+                                     " points or more, given " + std::to_string(given.size()));
+        return given;
+    }
+
     [[nodiscard]] Vec3 plane_at(std::size_t i) const {
         const std::uint32_t* row = &near_.indices[i * near_count];
         Vec3 mean{0, 0, 0};

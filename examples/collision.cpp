@@ -212,7 +212,7 @@ int run(const std::filesystem::path& folder, std::uint32_t width, int frames, in
 }  // namespace
 }  // namespace example
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) try {
     const std::filesystem::path folder = argc > 1 ? argv[1] : ".";
     const int width = argc > 2 ? std::atoi(argv[2]) : 128,
               frames = argc > 3 ? std::atoi(argv[3]) : 9,
@@ -220,4 +220,6 @@ int main(int argc, char** argv) {
     if (width < 16 || frames < 2 || triangles < 5000)
         return std::fprintf(stderr, "a width, 2 frames or more, 5000 triangles or more\n"), 2;
     return example::run(folder, static_cast<std::uint32_t>(width), frames, triangles);
+} catch (const std::exception& error) {  // a folder that is not there, a file that cannot be read
+    return std::fprintf(stderr, "%s\n", error.what()), 1;
 }

@@ -213,11 +213,13 @@ int run(const std::filesystem::path& folder, int width, int frames, int triangle
 }  // namespace
 }  // namespace example
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) try {
     const std::filesystem::path folder = argc > 1 ? argv[1] : ".";
     const int width = argc > 2 ? std::atoi(argv[2]) : 256,
               frames = argc > 3 ? std::atoi(argv[3]) : 12;
     const int triangles = argc > 4 ? std::atoi(argv[4]) : 50'000;
     if (width < 4 || frames < 1) return std::fprintf(stderr, "a width, a number of frames\n"), 2;
     return example::run(folder, width, frames, triangles);
+} catch (const std::exception& error) {  // a folder that is not there, a file that cannot be read
+    return std::fprintf(stderr, "%s\n", error.what()), 1;
 }

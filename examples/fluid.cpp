@@ -94,7 +94,7 @@ int run(const std::filesystem::path& folder, std::uint32_t width, float spacing,
 }  // namespace
 }  // namespace example
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) try {
     const std::filesystem::path folder = argc > 1 ? argv[1] : ".";
     const int width = argc > 2 ? std::atoi(argv[2]) : 128;
     const double spacing = argc > 3 ? std::atof(argv[3]) : 0.04,
@@ -103,4 +103,6 @@ int main(int argc, char** argv) {
         return std::fprintf(stderr, "a width, a spacing from 0.005 to 0.06, seconds\n"), 2;
     return example::run(folder, static_cast<std::uint32_t>(width), static_cast<float>(spacing),
                         seconds);
+} catch (const std::exception& error) {  // a folder that is not there, a file that cannot be read
+    return std::fprintf(stderr, "%s\n", error.what()), 1;
 }

@@ -238,7 +238,7 @@ bool prove(const World& world, const raydix::Scene& scene) {
 }  // namespace
 }  // namespace example
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) try {
     using namespace example;
     const std::string file = argc > 1 ? argv[1] : "path_tracer.png";
     const int width = argc > 2 ? std::atoi(argv[2]) : 160,
@@ -260,4 +260,6 @@ int main(int argc, char** argv) {
         std::printf("%d paths a pixel, %zu rays: mean %.4f\n", s, tracer.ray_count, mean_of(now));
     }
     return 0;
+} catch (const std::exception& error) {  // a folder that is not there, a file that cannot be read
+    return std::fprintf(stderr, "%s\n", error.what()), 1;
 }

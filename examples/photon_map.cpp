@@ -226,7 +226,7 @@ int run(const std::filesystem::path& folder, std::uint32_t width, std::size_t ph
 }  // namespace
 }  // namespace example
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) try {
     const std::filesystem::path folder = argc > 1 ? argv[1] : ".";
     const int width = argc > 2 ? std::atoi(argv[2]) : 96,
               photons = argc > 3 ? std::atoi(argv[3]) : 100'000,
@@ -235,4 +235,6 @@ int main(int argc, char** argv) {
         return std::fprintf(stderr, "a width, 1000 photons or more, k from 2 on\n"), 2;
     return example::run(folder, static_cast<std::uint32_t>(width),
                         static_cast<std::size_t>(photons), static_cast<std::uint32_t>(k));
+} catch (const std::exception& error) {  // a folder that is not there, a file that cannot be read
+    return std::fprintf(stderr, "%s\n", error.what()), 1;
 }

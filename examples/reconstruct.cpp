@@ -175,7 +175,7 @@ int run(const std::string& source, const std::filesystem::path& folder, std::uin
 }  // namespace
 }  // namespace example
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) try {
     const std::string source = argc > 1 ? argv[1] : "cat";
     const std::filesystem::path folder = argc > 2 ? argv[2] : ".";
     const int width = argc > 3 ? std::atoi(argv[3]) : 96, level = argc > 4 ? std::atoi(argv[4]) : 7;
@@ -190,4 +190,6 @@ int main(int argc, char** argv) {
                         argc > 7          ? from
                         : source == "cat" ? cat
                                           : usual);
+} catch (const std::exception& error) {  // a folder that is not there, a file that cannot be read
+    return std::fprintf(stderr, "%s\n", error.what()), 1;
 }

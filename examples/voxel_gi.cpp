@@ -71,7 +71,7 @@ float brightness(Vec3 v) { return (v.x + v.y + v.z) / 3; }
 }  // namespace
 }  // namespace example
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) try {
     using namespace example;
     const std::filesystem::path folder = argc > 1 ? argv[1] : ".";
     const int width = argc > 2 ? std::atoi(argv[2]) : 128,
@@ -119,4 +119,6 @@ int main(int argc, char** argv) {
         n, 100 * dark / n, cones / wanted, correlation, thin / wanted);
     const bool near = cones / wanted > 0.65 && cones / wanted < 1.1 && correlation > 0.75;
     return n > 20 && near && thin / wanted > 0.8 && thin / wanted < 1.1 ? 0 : 1;
+} catch (const std::exception& error) {  // a folder that is not there, a file that cannot be read
+    return std::fprintf(stderr, "%s\n", error.what()), 1;
 }

@@ -100,8 +100,9 @@ typedef struct raydix_commit_options {
 /* An empty scene. */
 RAYDIX_C_API raydix_status raydix_scene_create(raydix_scene** scene);
 /* Reads a file (.ply .obj .stl .off .gltf .glb .rdx) or makes a built-in scene ("builtin:NAME"),
-   and commits it. The options have no effect on a scene that raydix_scene_save wrote, whose trees
-   are read. Of an .rdx file that holds one tree the mesh is read, and a tree is built. */
+   and commits it. The ending of the path says what it is. The options have no effect on a scene
+   that raydix_scene_save wrote, whose trees are read. Of an .rdx file that holds one tree the mesh
+   is read, and a tree is built. */
 RAYDIX_C_API raydix_status raydix_scene_load(const char* path, const raydix_commit_options* options,
                                              raydix_scene** scene);
 RAYDIX_C_API void raydix_scene_destroy(raydix_scene* scene);

@@ -86,7 +86,8 @@ struct CommitReport {
     std::uint64_t trees_refitted = 0;  // those whose boxes were fitted again; others were kept
     double sah_ratio = 1;  // the largest SAH after a refit / at the build. Above refit_limit: that
                            // tree was built again
-    bool parts_refitted = false;  // the tree over meshes and instances was refitted, not built
+    bool parts_refitted = false;  // the tree over meshes and instances was refitted, not built or
+                                  // kept
     std::uint64_t bytes = 0;      // what rays read of the scene itself
     std::uint64_t paths = 0;      // ways to instances: each instance counts on every way to it
 };

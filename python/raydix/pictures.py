@@ -78,6 +78,7 @@ class SceneViews:
 
         `view`: "shaded" (sun and sky, a lamp in closed rooms), "normal", "depth", "primitive",
         "ao", "diffuse", "steps" (node visits) or "path" (up to eight bounces of light).
+        `camera`: one of `cameras` by its number, -1 for the last, or a `Camera`; None: the first.
         `size`: (width, height), each 1 to 16384.
         `samples`: rays a pixel that gather light, 1 to 4096; 0: 64 for "ao" and "path", 32 for
         "diffuse", 16 for "shaded". `ao_radius`: 0 means 5 % of the diagonal. The same picture for every number of

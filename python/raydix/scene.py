@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -42,6 +43,16 @@ from .surface import SurfaceOfHits, also_names
 _NO_NAMES = ()
 
 
+def _warn_of_points(count: int) -> None:
+    if count != 0:
+        warnings.warn(
+            f"{count:,} vertices without triangles: rays and distances find nothing here, and save "
+            "leaves them out; raydix.Points finds neighbours among points",
+            UserWarning,
+            stacklevel=4,
+        )
+
+
 class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
     """What rays are traced through and queries ask: triangle meshes, spheres, capsules, and
     instances of other scenes.
@@ -54,8 +65,9 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
     ----------
     vertices :
         None: an empty scene. Shape (V, 3), float32 or float64; or, with `faces` left out, the path
-        of a file (.ply, .obj, .stl, .gltf, .glb, .off, each also with .gz, .xz or .zst), the name
-        of a built-in scene ("builtin:atrium?triangles=10000"), or an object with the attributes
+        of a file of triangles (.ply, .obj, .stl, .gltf, .glb, .off, each also with .gz, .xz or
+        .zst; `load_scene` is for .rdx, `load_points` for points: a file or built-in scene of
+        points alone is taken with a UserWarning, since nothing is found in it), the name of a built-in scene ("builtin:atrium?triangles=10000"), or an object with the attributes
         `vertices` and `faces`, such as a `trimesh.Trimesh`.
     faces :
         Shape (F, 3), whole numbers: three vertex indices for each triangle.
@@ -115,8 +127,8 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
     commit makes one mesh in the world too, and a tree over it, which later ones ask.
 
     With precision "float64" compact=True raises NotImplementedError: there is no such layout. Another
-    device than "cpu" raises BackendUnavailable. Files other than .rdx raise ValueError, because they
-    are read in float32. Instances are of scenes in float64 too: others raise TypeError. Numbers other
+    device than "cpu" raises BackendUnavailable. Files raise ValueError, because they are read in float32;
+    `load_scene` reads a .rdx file in the type that it was saved in. Instances are of scenes in float64 too: others raise TypeError. Numbers other
     than 0 below 2**-500 count as 0.
 
     Scenes can be pickled and copied: one of `load_scene` that has not changed goes over as the path
@@ -201,8 +213,12 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
                         path(vertices, "vertices"), 1, *options
                     )
                     self._cameras = [Camera(**camera) for camera in cameras]
+                    if core.is_mesh() and len(core.faces) == 0:
+                        _warn_of_points(len(core.vertices))
                     return core
                 vertices, faces = self._built_in(os.fsdecode(vertices))
+                if len(faces) == 0:
+                    _warn_of_points(len(vertices))
             else:
                 vertices, faces = mesh_of(vertices)
         corners = mesh_vertices(vertices, dtype=self.dtype)
@@ -214,7 +230,7 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
         if not name.startswith("builtin:"):
             raise ValueError(
                 f"precision: files are read in float32, given 'float64' and the path {shown(name)}; "
-                "give vertices and faces as another library has read them"
+                "give vertices and faces as another library has read them; load_scene reads .rdx files"
             )
         loaded = _core.load_scene(path(name, "vertices"), 1)
         self.name = loaded["name"]

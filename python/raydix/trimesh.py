@@ -1,5 +1,6 @@
 """A ray object that `trimesh` accepts in place of its own.
 
+    import raydix.trimesh
     mesh.ray = raydix.trimesh.RayMeshIntersector(mesh)
 
 `mesh.contains`, `trimesh.proximity` and all else that asks `mesh.ray` then asks raydix.

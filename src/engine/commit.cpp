@@ -6,6 +6,7 @@
 
 #include "engine/mesh_commit.h"
 #include "engine/part_tree.h"
+#include "engine/settled.h"
 #include "engine/shape_commit.h"
 #include "engine/shape_tree.h"
 #include "exec/parallel.h"
@@ -44,14 +45,7 @@ struct WideMaker {
         finish(out.memory.share(std::move(built)), out);
     }
     static std::uint64_t left_out(const MeshTree& made) { return made.tree->stats().left_out; }
-    static void keep(const MeshTree& old, MeshTree& out) {
-        out.set_tree(old.tree);
-        out.refitter = old.refitter;
-        out.flats = old.flats;
-        out.memory = old.memory;
-    }
     static void share_rates(const MeshTree& old, MeshTree& out) {
-        if (out.tree == old.tree) return;  // others may be reading it
         out.tree->arrays().rates.share(old.tree->arrays().rates);
     }
     static std::optional<double> refit(const MeshTree& old, const MeshView& mesh,
@@ -87,8 +81,9 @@ public:
     }
 
     std::shared_ptr<const SceneTree> run() {
-        for (const auto& [id, geometry] : state_.geometries)
+        state_.for_each([&](std::uint32_t id, const Geometry& geometry) {
             (geometry.is_instance() ? instances_ : own_).emplace_back(id, &geometry);
+        });
         for (const auto& [id, geometry] : own_)
             if (geometry->is_mesh())
                 tree_->mesh_names.push_back({id, geometry->mask, geometry->mesh, geometry->own});
@@ -289,7 +284,11 @@ private:
 std::shared_ptr<const SceneTree> make_scene_tree(const SceneInternals::State& state,
                                                  const SceneOptions& options, CommitReport& report,
                                                  std::size_t most_placed) {
-    return run_commit(options, [&] { return Commit(state, options, report, most_placed).run(); });
+    return run_commit(options, [&] {
+        if (!is_settled(state, options)) return Commit(state, options, report, most_placed).run();
+        report = report_of_no_change(*state.report);
+        return state.tree;
+    });
 }
 
 }  // namespace raydix

@@ -9,6 +9,7 @@
 #include "engine/commit.h"
 #include "engine/mesh_commit.h"
 #include "engine/part_tree.h"
+#include "engine/settled.h"
 #include "engine/shape_commit.h"
 #include "tree/build_by_quality.h"
 
@@ -28,7 +29,6 @@ struct WideMakerD {
     static std::uint64_t left_out(const MeshTreeD& made) {
         return made.tree->arrays.stats.left_out;
     }
-    static void keep(const MeshTreeD& old, MeshTreeD& out) { out.tree = old.tree; }
     static void share_rates(const MeshTreeD&, MeshTreeD&) {}  // a scene has them
     static std::optional<double> refit(const MeshTreeD& old, const MeshViewD& mesh,
                                        const SceneOptions&, MeshTreeD& out) {
@@ -43,6 +43,8 @@ void unite_with(AabbD& box, const AabbD& other) {
 }
 
 class CommitD {
+    using Geometry = SceneInternalsD::State::Geometry;
+
 public:
     CommitD(const SceneInternalsD::State& state, const SceneOptions& options, CommitReport& report,
             std::size_t most_placed)
@@ -54,12 +56,12 @@ public:
 
     std::shared_ptr<const SceneTreeD> run() {
         OwnGeometries<double> own;
-        for (const auto& [id, geometry] : state_.geometries) {
-            if (geometry.is_instance()) continue;
+        state_.for_each([&](std::uint32_t id, const Geometry& geometry) {
+            if (geometry.is_instance()) return;
             own.emplace_back(id, &geometry);
             if (geometry.is_mesh())
                 tree_->mesh_names.push_back({id, geometry.mask, geometry.mesh, geometry.own});
-        }
+        });
         const std::size_t instances = state_.geometries.size() - own.size();
         MeshCommit<double, WideMakerD> meshes(state_, own, options_, report_);
         ShapeCommit<double> shapes(state_, own, options_, report_);
@@ -98,15 +100,15 @@ private:
     }
 
     void place_instances() {
-        for (const auto& [id, geometry] : state_.geometries) {
-            if (!geometry.is_instance()) continue;
+        state_.for_each([&](std::uint32_t id, const Geometry& geometry) {
+            if (!geometry.is_instance()) return;
             const auto& inner = geometry.scene->tree;
             const std::uint32_t number = number_instance(*tree_, id, inner);
             tree_->instances.push_back(
                 {id, geometry.mask, number, geometry.transform, geometry.inverse, inner});
             place({{geometry.inverse, geometry.mask}, number, 0, 0, inner.get()},
                   {id, affine_of(geometry.transform), geometry.inverse});
-        }
+        });
     }
 
     /// An instance of this scene.
@@ -158,7 +160,7 @@ private:
     void list_masks() {
         std::vector<std::uint32_t>& all = tree_->masks;
         const SceneTreeD* last = nullptr;
-        for (const auto& [id, geometry] : state_.geometries) all.push_back(geometry.mask);
+        state_.for_each([&](std::uint32_t, const Geometry& one) { all.push_back(one.mask); });
         for (const InstanceNameD& instance : tree_->instances) {
             if (instance.scene.get() == last) continue;  // most place what the one before them does
             last = instance.scene.get();
@@ -204,7 +206,11 @@ private:
 std::shared_ptr<const SceneTreeD> make_scene_tree(const SceneInternalsD::State& state,
                                                   const SceneOptions& options, CommitReport& report,
                                                   std::size_t most_placed) {
-    return run_commit(options, [&] { return CommitD(state, options, report, most_placed).run(); });
+    return run_commit(options, [&] {
+        if (!is_settled(state, options)) return CommitD(state, options, report, most_placed).run();
+        report = report_of_no_change(*state.report);
+        return state.tree;
+    });
 }
 
 }  // namespace raydix

@@ -9,8 +9,8 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
-#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -28,7 +28,6 @@ namespace raydix {
 ///   build(mesh, options, last, out)   a new one: tree and sah_at_build, 0 if it is not known;
 ///                                     `last`: the tree of the same meshes so far, or null
 ///   left_out(out)                     how many of its triangles are invalid
-///   keep(old, out)                    the same tree
 ///   share_rates(old, out)             which ways rays go is known from the old tree on
 ///   refit(old, mesh, options, out)    the old one around moved vertices, and its SAH; or none
 template <class Scalar, class Maker>
@@ -43,10 +42,8 @@ public:
     MeshCommit(const State& state, const OwnGeometries<Scalar>& own, const SceneOptions& options,
                CommitReport& report, Maker maker = {})
         : state_(state), own_(own), options_(options), report_(report), maker_(std::move(maker)) {
-        if (state.tree == nullptr || options.quality != state.tree->quality ||
-            options.compact != state.tree->compact)
-            return;
-        for (const auto& mesh : state.tree->meshes) last_[mesh->ids.front()] = mesh.get();
+        keeps_trees_ = state.tree != nullptr && options.quality == state.tree->quality &&
+                       options.compact == state.tree->compact;
     }
 
     /// The trees. `parts`: how many other parts the tree over all of them has, for what is told of
@@ -54,6 +51,7 @@ public:
     std::vector<std::shared_ptr<const MeshTree>> run(double parts) {
         std::vector<std::shared_ptr<const MeshTree>> trees;
         const std::vector<Group> groups = groups_of(options_.usage);
+        trees.reserve(groups.size());
         double work = static_cast<double>(groups.size()) + parts, done = 0;
         for (const Group& group : groups) work += work_of(group);
         for (const Group& group : groups) {
@@ -76,98 +74,133 @@ public:
     [[nodiscard]] double part_done() const { return done_; }
 
 private:
+    using Member = typename OwnGeometries<Scalar>::value_type;
+
     /// Meshes that one tree holds.
     struct Group {
-        std::uint32_t mask;
-        std::vector<std::uint32_t> ids;
+        std::span<const Member> members;  // by ascending id
+        /// The tree that the last commit made of the same meshes in the same way; or null.
+        std::shared_ptr<const MeshTree> last = {};
+        bool changed = true;  // since then
+
+        [[nodiscard]] std::uint32_t mask() const { return members.front().second->mask; }
+        [[nodiscard]] std::uint32_t first_id() const { return members.front().first; }
     };
 
-    [[nodiscard]] std::vector<Group> groups_of(Usage usage) const {
+    /// By ascending id of their first mesh.
+    std::vector<Group> groups_of(Usage usage) {
+        members_.reserve(own_.size());
+        for (const Member& member : own_)
+            if (member.second->is_mesh() && !member.second->mesh.triangles.empty())
+                members_.push_back(member);
+        std::vector<std::size_t> sizes;
+        if (usage == Usage::fixed)
+            sizes = sort_by_mask();
+        else
+            sizes.assign(members_.size(), 1);
         std::vector<Group> groups;
-        std::map<std::uint32_t, std::size_t> by_mask;
-        for (const auto& [id, geometry] : own_) {
-            if (!geometry->is_mesh() || geometry->mesh.triangles.empty()) continue;
-            const auto found = by_mask.find(geometry->mask);
-            if (usage == Usage::fixed && found != by_mask.end()) {
-                groups[found->second].ids.push_back(id);
-            } else {
-                by_mask[geometry->mask] = groups.size();
-                groups.push_back({geometry->mask, {id}});
-            }
+        groups.reserve(sizes.size());
+        std::size_t done = 0, old = 0;
+        for (const std::size_t size : sizes) {
+            Group group{std::span(members_).subspan(done, size)};
+            find_last(old, group);
+            groups.push_back(std::move(group));
+            done += size;
         }
         return groups;
     }
 
-    [[nodiscard]] const MeshView& mesh_of(std::uint32_t id) const {
-        return state_.geometries.at(id).mesh;
+    /// Brings meshes of the same mask together, where the first of them stands; how many each.
+    std::vector<std::size_t> sort_by_mask() {
+        std::map<std::uint32_t, std::size_t> by_mask;
+        std::vector<std::vector<Member>> groups;
+        for (const Member& member : members_) {
+            const auto [found, is_new] = by_mask.try_emplace(member.second->mask, groups.size());
+            if (is_new) groups.emplace_back();
+            groups[found->second].push_back(member);
+        }
+        members_.clear();
+        std::vector<std::size_t> sizes;
+        for (const auto& group : groups) {
+            members_.insert(members_.end(), group.begin(), group.end());
+            sizes.push_back(group.size());
+        }
+        return sizes;
+    }
+
+    /// Trees of the last commit lie by ascending id of their first mesh, too. `old`: all before it
+    /// begin with a lower id than the group.
+    void find_last(std::size_t& old, Group& group) const {
+        if (!keeps_trees_) return;
+        const auto& trees = state_.tree->meshes;
+        while (old < trees.size() && trees[old]->ids.front() < group.first_id()) ++old;
+        if (old == trees.size() ||
+            !std::ranges::equal(trees[old]->ids, group.members, {}, {}, &Member::first))
+            return;
+        group.last = trees[old];
+        group.changed = std::ranges::any_of(
+            group.members, [](const Member& member) { return member.second->changed; });
     }
 
     /// In triangles.
-    [[nodiscard]] double work_of(const Group& group) const {
-        if (kept(group) != nullptr) return 0;
+    [[nodiscard]] static double work_of(const Group& group) {
+        if (!group.changed) return 0;
         std::size_t triangles = 0;
-        for (const std::uint32_t id : group.ids) triangles += mesh_of(id).triangles.size();
+        for (const auto& [id, geometry] : group.members)
+            triangles += geometry->mesh.triangles.size();
         return static_cast<double>(triangles);
     }
 
-    /// The tree that the last commit made of the same meshes in the same way.
-    [[nodiscard]] const MeshTree* last_of(const Group& group) const {
-        const auto found = last_.find(group.ids.front());
-        return found != last_.end() && found->second->ids == group.ids ? found->second : nullptr;
-    }
-    /// The same if nothing of them changed.
-    [[nodiscard]] const MeshTree* kept(const Group& group) const {
-        for (const std::uint32_t id : group.ids)
-            if (state_.geometries.at(id).changed) return nullptr;
-        return last_of(group);
+    std::shared_ptr<const MeshTree> tree_of(const Group& group) {
+        if (!group.changed && group.last->mask == group.mask()) return group.last;
+        std::shared_ptr<MeshTree> out;
+        if (!group.changed) {
+            out = std::make_shared<MeshTree>(*group.last);
+        } else {
+            out = std::make_shared<MeshTree>();
+            for (const auto& [id, geometry] : group.members) out->ids.push_back(id);
+            if (!refit(group, *out)) build(group, *out);
+            if (options_.usage == Usage::moving && group.last != nullptr)
+                Maker::share_rates(*group.last, *out);
+            out->left_out = Maker::left_out(*out);
+            out->make_buckets();
+        }
+        out->mask = group.mask();
+        return out;
     }
 
-    std::shared_ptr<const MeshTree> tree_of(const Group& group) {
-        auto out = std::make_shared<MeshTree>();
-        out->ids = group.ids;
-        out->mask = group.mask;
-        if (const MeshTree* const old = kept(group)) {
-            out->first = old->first;
-            out->triangles = old->triangles;
-            out->sah_at_build = old->sah_at_build;
-            Maker::keep(*old, *out);
-        } else if (!refit(group, *out)) {
-            if (group.ids.size() == 1) {
-                const MeshView& mesh = mesh_of(group.ids.front());
-                out->first = {0};
-                out->triangles = mesh.triangles.size();
-                maker_.build(mesh, options_, last_of(group), *out);
-            } else {
-                std::vector<MeshView> meshes;
-                for (const std::uint32_t id : group.ids) meshes.push_back(mesh_of(id));
-                const Mesh mesh = merged<Mesh, MeshView>(meshes, out->first);
-                out->triangles = mesh.triangles.size();
-                maker_.build(mesh, options_, last_of(group), *out);
-            }
-            ++report_.trees_built;
+    void build(const Group& group, MeshTree& out) {
+        ++report_.trees_built;
+        if (group.members.size() == 1) {
+            const MeshView& mesh = group.members.front().second->mesh;
+            out.first = {0};
+            out.triangles = mesh.triangles.size();
+            maker_.build(mesh, options_, group.last.get(), out);
+            return;
         }
-        if (options_.usage == Usage::moving)
-            if (const MeshTree* const old = last_of(group)) Maker::share_rates(*old, *out);
-        out->left_out = Maker::left_out(*out);
-        out->make_buckets();
-        return out;
+        std::vector<MeshView> meshes;
+        for (const auto& [id, geometry] : group.members) meshes.push_back(geometry->mesh);
+        const Mesh mesh = merged<Mesh, MeshView>(meshes, out.first);
+        out.triangles = mesh.triangles.size();
+        maker_.build(mesh, options_, group.last.get(), out);
     }
 
     void refuse(const MeshTree& tree) const {
         using Box = BasicAabb<Scalar>;
         for (const std::uint32_t id : tree.ids) {
-            const MeshView& mesh = mesh_of(id);
+            const MeshView& mesh = state_.geometries.at(id).mesh;
             refuse_left_out<Box>(id, "triangle", source_of(mesh), mesh.triangles.size());
         }
     }
 
     /// The last tree around one mesh whose vertices moved, if it is still good enough.
     bool refit(const Group& group, MeshTree& out) {
-        if (options_.usage != Usage::moving || options_.refit_limit < 1 || group.ids.size() != 1)
+        if (options_.usage != Usage::moving || options_.refit_limit < 1 ||
+            group.members.size() != 1)
             return false;
-        const MeshTree* const old = last_of(group);
+        const MeshTree* const old = group.last.get();
         if (old == nullptr) return false;
-        const MeshView& mesh = mesh_of(group.ids.front());
+        const MeshView& mesh = group.members.front().second->mesh;
         out.sah_at_build = old->sah_at_build;
         const std::optional<double> now = Maker::refit(*old, mesh, options_, out);
         if (!now) return false;
@@ -185,7 +218,8 @@ private:
     const SceneOptions& options_;
     CommitReport& report_;
     Maker maker_;
-    std::unordered_map<std::uint32_t, const MeshTree*> last_;  // by their first mesh
+    bool keeps_trees_ = false;     // those of the last commit are made in the same way
+    std::vector<Member> members_;  // meshes that have triangles, those of a group in a row
     double done_ = 0;
 };
 

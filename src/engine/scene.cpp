@@ -20,6 +20,7 @@
 #include "base/options.h"
 #include "engine/commit.h"
 #include "engine/scene_state.h"
+#include "engine/settled.h"
 #include "exec/large_pages.h"
 #include "exec/parallel.h"
 
@@ -192,6 +193,7 @@ std::uint32_t insert(State& state, std::uint32_t id, typename State::Geometry ge
     decltype(state.geometries) added;
     added.emplace(id, std::move(geometry));
     state.taken.insert(id);
+    state.in_a_row.clear();
     state.geometries.merge(added);  // takes no memory
     while (!state.taken.empty() && *state.taken.begin() == state.next_id) {
         state.taken.erase(state.taken.begin());
@@ -269,9 +271,30 @@ BasicScene<Scalar>::State::~State() {
 
 template <class Scalar>
 auto BasicScene<Scalar>::State::at(std::uint32_t id) -> Geometry& {
+    if (id < in_a_row.size() && in_a_row[id].first == id) return *in_a_row[id].second;
     const auto found = geometries.find(id);
     if (found == geometries.end()) throw InputError("there is no " + name_of(id));
     return found->second;
+}
+
+template <class Scalar>
+void BasicScene<Scalar>::State::put_in_a_row() {
+    if (!in_a_row.empty()) return;
+    in_a_row.reserve(geometries.size());
+    for (auto& [id, geometry] : geometries) in_a_row.emplace_back(id, &geometry);
+}
+
+template <class Scalar>
+void BasicScene<Scalar>::State::take(std::shared_ptr<const typename SceneKind<Scalar>::Tree> made,
+                                     const CommitReport& told, double limit) {
+    auto scenes = scenes_below(geometries, *made);  // no memory: the last commit still stands
+    below.swap(scenes);
+    tree = std::move(made);
+    report = told;
+    refit_limit = limit;
+    for (const auto& mesh : tree->mesh_names) at(mesh.id).changed = false;
+    for (const auto& shapes : tree->shapes) at(shapes->id).changed = false;
+    changed = false;
 }
 
 template <class Scalar>
@@ -376,6 +399,7 @@ std::uint32_t BasicScene<Scalar>::add(const BasicScene& scene, const Transform& 
 template <class Scalar>
 void BasicScene<Scalar>::remove(std::uint32_t id) {
     static_cast<void>(state_->at(id));
+    state_->in_a_row.clear();
     state_->geometries.erase(id);
     state_->changed = true;
 }
@@ -435,11 +459,9 @@ CommitReport BasicScene<Scalar>::commit(const SceneOptions& options) {
                          std::to_string(options.refit_limit));
     const auto start = std::chrono::steady_clock::now();
     CommitReport report;
+    state_->put_in_a_row();
     auto tree = make_scene_tree(*state_, options, report);
-    state_->tree = std::move(tree);
-    for (const auto& mesh : state_->tree->mesh_names) state_->at(mesh.id).changed = false;
-    for (const auto& shapes : state_->tree->shapes) state_->at(shapes->id).changed = false;
-    state_->changed = false;
+    if (tree != state_->tree) state_->take(std::move(tree), report, options.refit_limit);
     const std::chrono::duration<double, std::milli> ms = std::chrono::steady_clock::now() - start;
     report.ms = ms.count();
     return report;

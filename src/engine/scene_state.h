@@ -9,6 +9,7 @@
 #include <optional>
 #include <set>
 #include <utility>
+#include <vector>
 
 #include "engine/scene_tree.h"
 #include "engine/scene_tree_double.h"
@@ -78,12 +79,32 @@ struct BasicScene<Scalar>::State {
     State& operator=(const State&) = delete;
 
     std::map<std::uint32_t, Geometry> geometries;
+    /// All of them in a row since the last commit; empty once one came or went. A walk through the
+    /// map waits for each node before it knows the next.
+    std::vector<std::pair<std::uint32_t, Geometry*>> in_a_row;
     std::uint64_t next_id = 0;      // all below were given once
     std::set<std::uint32_t> taken;  // those above, chosen by the caller
     bool changed = true;
     std::shared_ptr<const typename SceneKind<Scalar>::Tree> tree;  // null before the first commit
+    /// Of the commit that made `tree`: what it told, its limit, and the scenes that instances
+    /// place, each once, with their trees. No report of a tree that came from a file.
+    std::optional<CommitReport> report;
+    double refit_limit = 0;
+    std::vector<std::pair<const State*, const void*>> below;
 
     [[nodiscard]] Geometry& at(std::uint32_t id);
+    void put_in_a_row();
+    /// use(id, geometry) for each, by ascending id.
+    template <class Use>
+    void for_each(const Use& use) const {
+        if (in_a_row.empty())
+            for (const auto& [id, geometry] : geometries) use(id, geometry);
+        else
+            for (const auto& [id, geometry] : in_a_row) use(id, std::as_const(*geometry));
+    }
+    /// What a commit made; nothing counts as changed any more.
+    void take(std::shared_ptr<const typename SceneKind<Scalar>::Tree> made,
+              const CommitReport& told, double limit);
     /// Whether rays through this scene may come to `other`.
     [[nodiscard]] bool holds(const State* other) const;
 };

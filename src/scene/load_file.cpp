@@ -32,9 +32,14 @@ std::string extension_of(const std::filesystem::path& file) {
 bool is_gltf(const std::string& extension) { return extension == ".gltf" || extension == ".glb"; }
 
 Model load_gltf_file(ByteSource& in, const std::filesystem::path& file) {
-    return load_gltf(in, [folder = file.parent_path()](const std::filesystem::path& relative) {
-        return ByteSource::from_file(folder / relative, Packing::none);
-    });
+    return load_gltf(in,
+                     [&file, folder = file.parent_path()](const std::filesystem::path& relative) {
+                         try {
+                             return ByteSource::from_file(folder / relative, Packing::none);
+                         } catch (const InputError& error) {
+                             throw InputError(printable(file) + ": " + error.what());
+                         }
+                     });
 }
 
 Model model_of(Mesh mesh) {
@@ -47,7 +52,9 @@ Model load_by_extension(ByteSource& in, const std::filesystem::path& file,
                         const std::string& extension) {
     in.fill(rdx_start.size());
     if (extension == ".rdx" || in.buffered().starts_with(rdx_start))
-        in.fail("file", "holds a tree or a scene, which load_rdx or load_rdx_scene read");
+        in.fail("file",
+                "holds a saved tree, which load_rdx reads, or a saved scene: load_rdx_scene, "
+                "in Python load_scene");
     if (extension == ".ply") return model_of(load_ply(in));
     if (extension == ".obj") return model_of(load_obj(in));
     if (extension == ".stl") return model_of(load_stl(in));

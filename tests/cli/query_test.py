@@ -179,6 +179,9 @@ class Query(ProgramTest):
     def test_input_errors(self):
         self.fail_with_one_line("query", "absent.npy", "--knn", "1", names=["absent.npy"])
         self.fail_with_one_line("query", self.cloud, "--knn", "1", "--queries", "absent.npy", names=["absent.npy"])
+        for options in ([], ["--builder", "karras"]):
+            result = self.run_program("query", "builtin:figure?triangles=5000", "--closest", "--queries", "absent.npy", *options)
+            self.assertTrue(result.err.startswith("raydix: absent.npy: "), result.err)
         self.fail_with_one_line("query", self.cloud, "--box", "--queries", self.file, names=["queries.npy", "(N, 6)"])
         self.fail_with_one_line("query", self.cloud, "--box", "--queries", self.write("t.ply", TRIANGLE), names=["t.ply", "(Q, 6)"])
         self.fail_with_one_line("query", self.cloud, "--knn", "1", "--strict", names=["cloud.npy", "point 340"])

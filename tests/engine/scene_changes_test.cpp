@@ -8,13 +8,18 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <thread>
+#include <tuple>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
 #include "engine/float_world.h"
+#include "engine/scene_state.h"
 #include "exec/memory.h"
+#include "support/double_scenes.h"
 #include "support/message.h"
 #include "support/support.h"
 
@@ -130,6 +135,78 @@ TEST(SceneChanges, MovingMeshesAreBuiltOnlyWhenTheyChange) {
     EXPECT_EQ(scene.commit(moving).trees_built, 1u);
     // Four meshes share a tree now; the one of another mask keeps its own.
     EXPECT_EQ(scene.commit({.usage = Usage::fixed}).trees_built, 1u);
+}
+
+template <class AnyScene>
+void keeps_its_tree_where_nothing_changed() {
+    RandomScenes random(4);
+    const auto mesh = [&](std::uint64_t seed) {
+        if constexpr (std::is_same_v<AnyScene, Scene>)
+            return random_soup(50, seed);
+        else
+            return random_soup_d(50, seed);
+    };
+    AnyScene leaf, other, world;
+    for (AnyScene* scene : {&leaf, &other}) scene->add(mesh(1)), scene->commit();
+    world.add(mesh(2));
+    const std::uint32_t ball =
+        world.add(std::vector<typename AnyScene::Sphere>{{{0, 0, 0}, 0.25f}});
+    for (AnyScene* scene : {&leaf, &other, &leaf}) world.add(*scene, {});
+    using Scalar = std::conditional_t<std::is_same_v<AnyScene, Scene>, float, double>;
+    const auto& tree = BasicSceneInternals<Scalar>::tree;
+    for (const Usage usage : {Usage::fixed, Usage::moving}) {
+        SceneOptions options{.usage = usage};
+        const CommitReport first = world.commit(options);
+        const auto made = tree(world);
+        std::vector<double> progress;
+        options.progress = [&](double part) { progress.push_back(part); };
+        const CommitReport again = world.commit(options);
+        options.progress = {};
+        EXPECT_EQ(tree(world), made);
+        EXPECT_EQ(progress.back(), 1.0);
+        EXPECT_EQ(again.trees_built + again.trees_refitted, 0u);
+        EXPECT_EQ(std::tie(again.meshes, again.instances, again.triangles, again.shapes,
+                           again.primitives, again.bytes, again.paths),
+                  std::tie(first.meshes, first.instances, first.triangles, first.shapes,
+                           first.primitives, first.bytes, first.paths));
+        // Whatever is another commit is one.
+        const auto commits = [&](const SceneOptions& given, const char* what) {
+            const auto last = tree(world);
+            world.commit(given);
+            EXPECT_NE(tree(world), last) << what;
+        };
+        leaf.update(0, mesh(3));
+        world.commit(options);
+        EXPECT_EQ(tree(world), made);  // the change below has not been committed
+        leaf.commit();
+        commits(options, "a scene below");
+        world.set_transform(ball + 1, {{{{1, 0, 0, 2}, {0, 1, 0, 0}, {0, 0, 1, 0}}}});
+        commits(options, "moved");
+        world.set_mask(0, usage == Usage::fixed ? 6 : 7);
+        commits(options, "another mask");
+        world.update(ball, std::vector<typename AnyScene::Sphere>{{{0, 0, 0}, 0.5f}});
+        commits(options, "another sphere");
+        SceneOptions higher = options;
+        higher.quality = Quality::fast;
+        commits(higher, "another quality");
+        commits(options, "and back");
+        higher = options;
+        higher.refit_limit = 2;
+        commits(higher, "another limit");
+    }
+    // What a commit that is strict refuses was taken by the last one.
+    auto bad = mesh(5);
+    bad.vertices[0].x = std::numeric_limits<float>::infinity();
+    world.update(0, bad);
+    world.commit();
+    world.commit();
+    EXPECT_THROW(world.commit({.strict = true}), InputError);
+    EXPECT_THROW(world.commit({.threads = 5000}), InputError);
+}
+
+TEST(SceneChanges, KeepItsTreeWhereNothingChanged) {
+    keeps_its_tree_where_nothing_changed<Scene>();
+    keeps_its_tree_where_nothing_changed<SceneD>();
 }
 
 TEST(SceneChanges, BuildsAgainInTheMemoryOfEarlierTrees) {

@@ -1,6 +1,7 @@
 """Scenes: what they refuse, and what they say then."""
 
 import pathlib
+import warnings
 
 import numpy as np
 import pytest
@@ -212,3 +213,15 @@ def test_batches_of_nothing_are_checked_as_others(precision):
     assert mesh.intersect(none, none).t.shape == (0,)
     assert mesh.all_hits(rays)["offsets"].tolist() == [0]
     assert mesh.touched_by(spheres=np.zeros((0, 4)))["offsets"].tolist() == [0]
+
+
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+def test_points_alone_come_with_a_warning(precision):
+    with pytest.warns(UserWarning, match="20 vertices without triangles") as told:
+        scene = raydix.Scene("builtin:uniform?points=20", precision=precision)
+    assert told[0].filename == __file__ and len(scene.vertices) == 20
+    assert not scene.occluded([0.5, 0.5, 5], [0, 0, -1])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        raydix.Scene("builtin:figure?triangles=5000", precision=precision)
+        raydix.Scene(np.eye(3), [], precision=precision)

@@ -72,7 +72,9 @@ TEST(LoadMesh, what_cannot_be_read) {
     EXPECT_TRUE(file_error(folder.path() / "a.txt")
                     .starts_with(root + "/a.txt: file name: ends in none of .ply"));
     write(folder.path() / "a.RDX", "");
-    EXPECT_TRUE(file_error(folder.path() / "a.RDX").ends_with("load_rdx or load_rdx_scene read"));
+    EXPECT_TRUE(file_error(folder.path() / "a.RDX")
+                    .ends_with("load_rdx reads, or a saved scene: load_rdx_scene, in Python "
+                               "load_scene"));
     write(folder.path() / "secret.obj", "v 0 0 0\n");
     std::filesystem::permissions(folder.path() / "secret.obj", std::filesystem::perms::none);
     if (geteuid() != 0) {
@@ -80,8 +82,9 @@ TEST(LoadMesh, what_cannot_be_read) {
                   root + "/secret.obj: cannot be opened: Permission denied");
     }
     write(folder.path() / "a.gltf", gltf_json(R"("uri":"absent.bin",)"));
-    EXPECT_EQ(file_error(folder.path() / "a.gltf"),
-              root + "/absent.bin: cannot be opened: No such file or directory");
+    EXPECT_EQ(
+        file_error(folder.path() / "a.gltf"),
+        root + "/a.gltf: " + root + "/absent.bin: cannot be opened: No such file or directory");
 }
 
 TEST(LoadModel, cameras_of_another_program) {
