@@ -28,7 +28,7 @@ namespace {
 template <class Tree>
 auto seen_shapes(const Tree& scene, std::uint32_t mask) -> decltype(scene.shapes.front().get()) {
     for (const auto& shapes : scene.shapes)
-        if ((shapes->mask & mask) != 0) return shapes.get();
+        if ((shapes->mask & mask) != 0 && !shapes->empty()) return shapes.get();
     return nullptr;
 }
 

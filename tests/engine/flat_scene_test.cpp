@@ -415,6 +415,13 @@ TEST(SceneSolid, ShapesAreRefusedByName) {
               }),
               "overlapping_pairs: geometry 3 (user geometry) is no triangle mesh");
     EXPECT_EQ(Solid(scene, {.mask = 1}).bvh().input_count(), 3u);
+    // Geometry without primitives stands in nobody's way.
+    scene.update(2, std::span<const Sphere>());
+    scene.update(3, UserGeometry(std::vector<Aabb>(),
+                                 [](std::uint32_t, const Ray&, Hit&) { return false; }));
+    scene.commit();
+    EXPECT_EQ(Solid(scene, {.mask = 13}).bvh().input_count(), 3u);
+    EXPECT_EQ(count_overlapping_pairs(Scene(random_soup(1, 1)), scene, {.mask = 8}), 0u);
 }
 
 /// 2^levels copies of a mesh, by as few instances.

@@ -133,6 +133,13 @@ TEST(SceneChanges, MovingMeshesAreBuiltOnlyWhenTheyChange) {
     scene.update(3, random_soup(60, 9));
     scene.set_mask(1, 7);
     EXPECT_EQ(scene.commit(moving).trees_built, 1u);
+    RandomScenes random(2);
+    const std::vector<Ray> rays = random_rays(random, 500);
+    std::vector<Hit> hits(rays.size());
+    for (const std::uint32_t mask : {7u, 8u}) {
+        trace(scene, rays, hits, {.mask = mask});
+        EXPECT_EQ(std::ranges::count(hits, 1u, &Hit::geometry) > 0, mask == 7) << mask;
+    }
     // Four meshes share a tree now; the one of another mask keeps its own.
     EXPECT_EQ(scene.commit({.usage = Usage::fixed}).trees_built, 1u);
 }
