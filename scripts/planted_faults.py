@@ -482,6 +482,8 @@ FAULTS = [
           "hploc: lanes read merged clusters that other lanes may not have written yet", "gpu", by_threads=True),
     Fault("src/tree/hploc.h", "*a_.root = list.ref[lane];\n        });\n        warp_.sync();", "*a_.root = list.ref[lane];\n        });",
           "hploc: a list of clusters is read by a lane that did not wait for it", "gpu", by_threads=True),
+    Fault("src/tree/hploc.h", "if (merging != 0) warp_.sync();", "",
+          "hploc: lanes read lists that only one lane of their warp has acquired", "gpu", by_threads=True),
     Fault("src/exec/warp.h", "to[lane] = from[source(lane) & 31];", "to[lane] = from[(source(lane) + 1) & 31];",
           "warps of the host: a shuffle takes the next lane's value", "exec"),
     Fault("src/base/device_words.h",
