@@ -25,6 +25,9 @@ if(NOT RAYDIX_KERNEL_LLD OR NOT RAYDIX_KERNEL_READELF)
 endif()
 set(RAYDIX_HAVE_HIP ON)
 
+# Code objects of version 4, which every ROCm since 5.0 loads. clang's own choice, 6, is refused before 6.3; from 5 on kernels
+# ask the runtime for the size of their groups in hidden arguments, which ROCm 5.0 does not write.
+set(raydix_code_object_version 4)
 # All kernels as one source: most of the time goes to the headers.
 set(raydix_code_object_folder ${CMAKE_CURRENT_BINARY_DIR}/code_objects)
 set(raydix_all_kernels)
@@ -41,7 +44,8 @@ foreach(architecture ${RAYDIX_HIP_ARCHITECTURES})
         set(whole_registers -Xclang -target-feature -Xclang -real-true16)
     endif()
     add_custom_command(OUTPUT ${to}.co DEPENDS ${raydix_code_object_folder}/all.hip ${raydix_kernel_sources} DEPFILE ${to}.d
-        COMMAND ${RAYDIX_KERNEL_CLANG} ${raydix_hip_flags} ${whole_registers} --offload-arch=${architecture} --no-gpu-bundle-output
+        COMMAND ${RAYDIX_KERNEL_CLANG} ${raydix_hip_flags} ${whole_registers} --offload-arch=${architecture}
+            -mcode-object-version=${raydix_code_object_version} --no-gpu-bundle-output
             -fno-crash-diagnostics -Xclang -dependency-file -Xclang ${to}.d -Xclang -MT -Xclang ${to}.co
             -c ${raydix_code_object_folder}/all.hip -o ${to}.co
         COMMENT "Kernels to a code object for ${architecture}" VERBATIM)

@@ -55,6 +55,25 @@ void synchronize(Stream stream);
 
 class DeviceBackend;  // of the library's own
 
+/// The GPU of CUDA that `memory` lies in is this thread's current one for as long as this lives;
+/// then it is the one from before. Does nothing for memory of the host and for other kinds of
+/// devices. Calls with memory or trees of a device do so by themselves; what is allocated lies on
+/// the current GPU. Throws DeviceError.
+class OnDeviceOf {
+public:
+    explicit OnDeviceOf(const void* memory);
+    ~OnDeviceOf();
+    OnDeviceOf(const OnDeviceOf&) = delete;
+    OnDeviceOf& operator=(const OnDeviceOf&) = delete;
+
+    /// The current GPU's number in CUDA; -1 for other kinds of devices.
+    [[nodiscard]] int index() const;
+
+private:
+    DeviceBackend* backend_;
+    int before_;
+};
+
 namespace detail {
 struct DeviceMemory {
     void* data = nullptr;

@@ -48,8 +48,8 @@ enum class CwbvhKernel : std::uint32_t {
 /// Asynchronous: the call puts launches on `stream` and returns. It allocates nothing and waits for
 /// nothing. `scratch` is device memory of device_cwbvh_scratch_bytes or more, aligned to 256 bytes.
 /// It is in use until the stream is past the call. Throws InputError: 2^31 rays or more, a tree
-/// deeper than device_cwbvh_max_depth, scratch that is too small or not aligned. Throws
-/// BackendUnavailable, DeviceError.
+/// deeper than device_cwbvh_max_depth, scratch that is too small, memory that is not aligned.
+/// Throws BackendUnavailable, DeviceError.
 void trace_on_device(const DeviceCwbvhTree& tree, const Ray* rays, std::uint32_t count,
                      TreeHit* hits, CwbvhKernel kernel, std::span<std::byte> scratch,
                      Stream stream);

@@ -24,9 +24,10 @@ public:
     explicit DeviceWarpTree(const WarpTree& tree, Stream stream = nullptr);
     /// Takes a tree of triangles that was built on the device with pairs. Pairs and ids are read
     /// where they lie, so they must outlive this object. After a rebuild there it must be made
-    /// again. It has no wide nodes. Waits for `stream` to
-    /// learn the tree's counts. Throws InputError: a tree without pairs or triangles, one deeper
-    /// than 127, an index past the vertices in its data. Throws BackendUnavailable, DeviceError.
+    /// again. It has no wide nodes. Waits for `stream`,
+    /// so that rays may come on any. Throws InputError: a tree without pairs or triangles, one
+    /// deeper than 127, an index past the vertices in its data. Throws BackendUnavailable,
+    /// DeviceError.
     explicit DeviceWarpTree(const DeviceTree& tree, Stream stream = nullptr);
     ~DeviceWarpTree();
     DeviceWarpTree(DeviceWarpTree&&) noexcept;

@@ -97,6 +97,12 @@ class DeviceRays:
             )
         if "float32" not in str(rays.dtype):
             raise TypeError(f"rays: on a GPU, expected float32, given shape {shape} {rays.dtype}")
+        gpu = int(rays.__dlpack_device__()[1])
+        if gpu != self._core.gpu:
+            raise ValueError(
+                f"rays: expected an array on GPU {self._core.gpu}, where the scene is, "
+                f"given one on GPU {gpu}"
+            )
         return rays.reshape(-1, 8), shape[:-1]
 
     def intersect(

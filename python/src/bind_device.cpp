@@ -63,7 +63,13 @@ public:
         tree_ = DeviceCwbvh(one ? Cwbvh(scene.bvh("device"), options.threads)
                                 : Cwbvh(build_bvh(merged.mesh, options), options.threads));
         names_ = DeviceMeshNames(merged.names);
+        gpu_ = OnDeviceOf(tree_.tree().nodes).index();
     }
+
+    /// Of CUDA: the one that was current when the tree was made. -1 for other kinds of devices.
+    [[nodiscard]] int gpu() const { return gpu_; }
+    /// In device memory; null if there is nothing to hit.
+    [[nodiscard]] const void* memory() const { return tree_.tree().nodes; }
 
     /// What this thread does on devices from now on is done on the one of this scene: first in all
     /// calls below.
@@ -90,6 +96,7 @@ private:
     std::string device_;
     DeviceCwbvh tree_;
     DeviceMeshNames names_;
+    int gpu_ = -1;
 };
 
 const Ray* aligned_rays(const DeviceRays& rays) {
@@ -105,6 +112,7 @@ Stream stream_of(std::uintptr_t handle) { return reinterpret_cast<Stream>(handle
 DeviceHits intersect_there(const DeviceScene& self, const DeviceRays& rays, std::uintptr_t stream) {
     const std::size_t count = rays.shape(0);
     self.select();
+    const OnDeviceOf on(rays.data());  // results lie where the rays do
     auto hits = std::make_unique<HitsThere>(count);
     self.trace(aligned_rays(rays), count, *hits, stream_of(stream));
     float* const floats = reinterpret_cast<float*>(hits->hits.data());
@@ -122,6 +130,7 @@ DeviceArray<std::uint8_t> occluded_there(const DeviceScene& self, const DeviceRa
                                          std::uintptr_t stream) {
     const std::size_t count = rays.shape(0);
     self.select();
+    const OnDeviceOf on(rays.data());  // results lie where the rays do
     auto flags = std::make_unique<DeviceBuffer<std::uint8_t>>(count);
     self.trace_any(aligned_rays(rays), count, flags->data(), stream_of(stream));
     std::uint8_t* const data = flags->data();
@@ -137,6 +146,7 @@ void intersect_here(const DeviceScene& self, const RaysIn& rays, const HitsOut& 
         throw nb::value_error("a result has another length than its queries");
     in_pieces(given.size(), [&](std::size_t begin, std::size_t end) {
         self.select();
+        const OnDeviceOf on(self.memory());
         const DeviceBuffer<Ray> there(given.subspan(begin, end - begin));
         const HitsThere hits(end - begin);
         self.trace(there.data(), end - begin, hits, nullptr);
@@ -151,6 +161,7 @@ void occluded_here(const DeviceScene& self, const RaysIn& rays, const FlagsOut& 
         throw nb::value_error("a result has another length than its queries");
     in_pieces(given.size(), [&](std::size_t begin, std::size_t end) {
         self.select();
+        const OnDeviceOf on(self.memory());
         const DeviceBuffer<Ray> there(given.subspan(begin, end - begin));
         const DeviceBuffer<std::uint8_t> flags(end - begin);
         self.trace_any(there.data(), end - begin, flags.data(), nullptr);
@@ -175,6 +186,7 @@ void bind_device(nb::module_& module) {
                             "A tree on a device; raydix.Scene(device=...) is what to use.")
         .def(nb::init<SceneTrees&, std::string>(), nb::arg("scene"), nb::arg("device"),
              nb::call_guard<nb::gil_scoped_release>())
+        .def_prop_ro("gpu", &DeviceScene::gpu)
         .def("intersect_there", &intersect_there, nb::arg("rays").noconvert(), nb::arg("stream"))
         .def("occluded_there", &occluded_there, nb::arg("rays").noconvert(), nb::arg("stream"))
         .def("intersect_here", &intersect_here, nb::arg("rays").noconvert(),

@@ -1,4 +1,5 @@
-// Failed calls of the CUDA runtime become DeviceError.
+// Failed calls of the CUDA runtime become DeviceError, once: the thread's last error is cleared, so
+// that the next launch, which asks for it, does not throw what has been thrown.
 #pragma once
 
 #include <cuda_runtime.h>
@@ -10,6 +11,7 @@ namespace raydix {
 
 [[noreturn]] inline void cuda_failed(cudaError_t status, const char* expression, const char* file,
                                      int line) {
+    static_cast<void>(cudaGetLastError());
     throw DeviceError(std::string(expression) + " at " + file + ":" + std::to_string(line) + ": " +
                       cudaGetErrorName(status) + ": " + cudaGetErrorString(status));
 }

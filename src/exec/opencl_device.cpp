@@ -120,6 +120,15 @@ std::vector<OpenclFound> find_opencl_devices() {
     return found;
 }
 
+void opencl_build_failed(cl_int status, const std::string& device, const std::string& about) {
+    // What CL_FP_CORRECTLY_ROUNDED_DIVIDE_SQRT says is not asked: drivers of processors round
+    // correctly, take the option and do not claim it.
+    if (status == CL_INVALID_BUILD_OPTIONS)
+        throw BackendUnavailable("device opencl: " + device +
+                                 " lacks correctly rounded division and square roots");
+    opencl_failed(status, "clBuildProgram", about);
+}
+
 OpenclDevice::OpenclDevice(const OpenclFound& found)
     : platform_(found.platform), device_(found.device), traits_(found.traits) {
     const std::string lacks = opencl_lacks(traits_);
@@ -230,7 +239,7 @@ cl_program OpenclDevice::program(const char* module) {
         std::string log(bytes, '\0');
         static_cast<void>(cl.GetProgramBuildInfo(program, device_, CL_PROGRAM_BUILD_LOG, bytes,
                                                  log.data(), nullptr));
-        opencl_failed(status, "clBuildProgram", std::string(module) + " (" + log.c_str() + ")");
+        opencl_build_failed(status, traits_.name, std::string(module) + " (" + log.c_str() + ")");
     }
     return programs_.emplace(module, std::move(owned)).first->second.get();
 }

@@ -32,6 +32,11 @@ struct OpenclTraits {
 /// What of the above a device lacks; "" if nothing.
 [[nodiscard]] std::string opencl_lacks(const OpenclTraits& traits);
 
+/// A module of kernels that the driver did not compile. Throws BackendUnavailable if it refuses the
+/// one option, correctly rounded division and square roots; else DeviceError.
+[[noreturn]] void opencl_build_failed(cl_int status, const std::string& device,
+                                      const std::string& about);
+
 /// A device as it is found, before it is opened.
 struct OpenclFound {
     cl_platform_id platform;

@@ -31,6 +31,11 @@ public:
 
     /// Throws BackendUnavailable, which says why there is no device.
     [[nodiscard]] virtual std::string name() = 0;
+    // CUDA's backend is all of its GPUs. enter() makes the one of `memory` current for this thread
+    // and returns what leave() takes back. Other backends have one device each.
+    [[nodiscard]] virtual int enter(const void*) { return -1; }
+    virtual void leave(int) noexcept {}
+    [[nodiscard]] virtual int current() { return -1; }
     virtual void synchronize(Stream stream) = 0;
     [[nodiscard]] virtual void* allocate(std::size_t bytes) = 0;  // bytes > 0; aligned to 256
     virtual void free(void* memory) noexcept = 0;

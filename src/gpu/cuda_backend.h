@@ -23,6 +23,9 @@ public:
     CudaBackend() : LaunchedQueries("cuda", CudaMachine()) {}
 
     std::string name() override;
+    int enter(const void* memory) override;
+    void leave(int before) noexcept override;
+    int current() override;
     void synchronize(Stream stream) override;
     void* allocate(std::size_t bytes) override;
     void free(void* memory) noexcept override;

@@ -34,20 +34,26 @@ std::size_t device_cwbvh_scratch_bytes(CwbvhKernel kernel) {
     return kernel == CwbvhKernel::persistent_cwbvh ? 256 : 0;
 }
 
-void check_cwbvh_launch(const DeviceCwbvhTree& tree, std::uint32_t count, CwbvhKernel kernel,
-                        std::span<std::byte> scratch) {
-    check_enum("kernel", kernel, CwbvhKernel::persistent_cwbvh);
-    if (count >= 1u << 31) throw InputError("2^31 rays or more in one launch");
-    if (tree.max_depth > device_cwbvh_max_depth)
-        throw InputError("the wide tree is " + std::to_string(tree.max_depth) +
+void check_cwbvh_launch(const DeviceBackend::CwbvhCall& call) {
+    const auto aligned = [](const void* at, std::uintptr_t to) {
+        return reinterpret_cast<std::uintptr_t>(at) % to == 0;
+    };
+    check_enum("kernel", call.kernel, CwbvhKernel::persistent_cwbvh);
+    if (call.count >= 1u << 31) throw InputError("2^31 rays or more in one launch");
+    if (call.tree.max_depth > device_cwbvh_max_depth)
+        throw InputError("the wide tree is " + std::to_string(call.tree.max_depth) +
                          " levels deep; the kernels' stacks hold " +
                          std::to_string(device_cwbvh_max_depth));
-    const std::size_t wanted = device_cwbvh_scratch_bytes(kernel);
-    if (scratch.size() < wanted)
+    if (!aligned(call.tree.nodes, 16) || !aligned(call.tree.triangles, 16))
+        throw InputError("the wide tree on the device is not aligned to 16 bytes");
+    if (!aligned(call.rays, 16) || !aligned(call.hits, 16))
+        throw InputError("rays and hits on the device are not aligned to 16 bytes");
+    const std::size_t wanted = device_cwbvh_scratch_bytes(call.kernel);
+    if (call.scratch.size() < wanted)
         throw InputError("the launch wants " + std::to_string(wanted) +
                          " bytes of scratch on the device; it was given " +
-                         std::to_string(scratch.size()));
-    if (wanted != 0 && reinterpret_cast<std::uintptr_t>(scratch.data()) % 256 != 0)
+                         std::to_string(call.scratch.size()));
+    if (wanted != 0 && !aligned(call.scratch.data(), 256))
         throw InputError("the scratch on the device is not aligned to 256 bytes");
 }
 

@@ -1,16 +1,12 @@
 // What a launch over a compressed wide tree refuses.
 #pragma once
 
-#include <raydix/device_cwbvh.h>
-
-#include <cstddef>
-#include <cstdint>
-#include <span>
+#include "gpu/backend.h"
 
 namespace raydix {
 
-/// Throws InputError: an unknown kernel, too many rays, too deep a tree, too little scratch.
-void check_cwbvh_launch(const DeviceCwbvhTree& tree, std::uint32_t count, CwbvhKernel kernel,
-                        std::span<std::byte> scratch);
+/// Throws InputError: an unknown kernel, too many rays, too deep a tree, too little scratch, memory
+/// that is not aligned.
+void check_cwbvh_launch(const DeviceBackend::CwbvhCall& call);
 
 }  // namespace raydix

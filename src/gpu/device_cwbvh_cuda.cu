@@ -16,12 +16,18 @@ constexpr int block_threads = 128;
 constexpr int usual_depth = 24;
 
 struct Launch {
-    const DeviceCwbvhTree& tree;
-    const Ray* rays;
-    std::uint32_t count;
-    CwbvhKernel kernel;
-    std::span<std::byte> scratch;
+    const DeviceBackend::CwbvhCall& call;
     cudaStream_t stream;
+    CudaEvent *before, *behind;  // null, or where the device's time is taken
+
+    /// Puts work on the stream, between the marks. What the host must ask comes before this.
+    template <class Put>
+    void put(const Put& put_work) const {
+        if (before != nullptr) before->record(stream);
+        put_work();
+        RAYDIX_CUDA_TRY(cudaGetLastError());
+        if (behind != nullptr) behind->record(stream);
+    }
 };
 
 /// Blocks that fill the device, and no more than there are rays for.
@@ -38,27 +44,31 @@ unsigned resident_blocks(Kernel kernel, unsigned needed) {
 
 template <bool any, int stack_entries, class Store>
 void launch_with_stack(const Launch& launch, const Store& store) {
+    const DeviceBackend::CwbvhCall& call = launch.call;
     const kernels::CwbvhRays<Store> given{
-        {launch.tree.nodes, launch.tree.triangles, launch.tree.bounds},
-        launch.rays,
-        launch.count,
-        store};
-    const unsigned blocks = (launch.count + block_threads - 1) / block_threads;
-    if (launch.kernel == CwbvhKernel::persistent_cwbvh) {
-        auto* next = reinterpret_cast<std::uint32_t*>(launch.scratch.data());
-        RAYDIX_CUDA_TRY(cudaMemsetAsync(next, 0, sizeof(*next), launch.stream));
+        {call.tree.nodes, call.tree.triangles, call.tree.bounds}, call.rays, call.count, store};
+    unsigned blocks = (call.count + block_threads - 1) / block_threads;
+    if (call.kernel == CwbvhKernel::persistent_cwbvh) {
+        auto* next = reinterpret_cast<std::uint32_t*>(call.scratch.data());
         const auto kernel = kernels::persistent_cwbvh_rays<any, stack_entries, Store>;
-        kernel<<<resident_blocks(kernel, blocks), block_threads, 0, launch.stream>>>(given, next);
+        blocks = resident_blocks(kernel, blocks);
+        launch.put([&] {
+            RAYDIX_CUDA_TRY(cudaMemsetAsync(next, 0, sizeof(*next), launch.stream));
+            kernel<<<blocks, block_threads, 0, launch.stream>>>(given, next);
+        });
     } else {
-        kernels::cwbvh_rays<any, stack_entries, Store>
-            <<<blocks, block_threads, 0, launch.stream>>>(given);
+        launch.put([&] {
+            kernels::cwbvh_rays<any, stack_entries, Store>
+                <<<blocks, block_threads, 0, launch.stream>>>(given);
+        });
     }
-    RAYDIX_CUDA_TRY(cudaGetLastError());
 }
 
 /// A tree without nodes: every ray misses.
 void store_misses(const Launch& launch, const kernels::StoreOccluded& store) {
-    RAYDIX_CUDA_TRY(cudaMemsetAsync(store.occluded, 0, launch.count, launch.stream));
+    launch.put([&] {
+        RAYDIX_CUDA_TRY(cudaMemsetAsync(store.occluded, 0, launch.call.count, launch.stream));
+    });
 }
 
 __global__ void fill_misses(TreeHit* hits, std::uint32_t count) {
@@ -67,41 +77,44 @@ __global__ void fill_misses(TreeHit* hits, std::uint32_t count) {
 }
 
 void store_misses(const Launch& launch, const kernels::StoreHit& store) {
-    const unsigned blocks = (launch.count + block_threads - 1) / block_threads;
-    fill_misses<<<blocks, block_threads, 0, launch.stream>>>(store.hits, launch.count);
-    RAYDIX_CUDA_TRY(cudaGetLastError());
+    const std::uint32_t count = launch.call.count;
+    const unsigned blocks = (count + block_threads - 1) / block_threads;
+    launch.put(
+        [&] { fill_misses<<<blocks, block_threads, 0, launch.stream>>>(store.hits, count); });
 }
 
 template <bool any, class Store>
 void launch_rays(const Launch& launch, const Store& store) {
-    static_cast<void>(cuda_backend().name());  // says what is missing
-    check_cwbvh_launch(launch.tree, launch.count, launch.kernel, launch.scratch);
-    if (launch.count == 0) return;
-    if (launch.tree.node_count == 0)
+    if (launch.call.count == 0)
+        launch.put([] {});
+    else if (launch.call.tree.node_count == 0)
         store_misses(launch, store);
-    else if (launch.tree.max_depth <= usual_depth)
+    else if (launch.call.tree.max_depth <= usual_depth)
         launch_with_stack<any, usual_depth>(launch, store);
     else
         launch_with_stack<any, device_cwbvh_max_depth>(launch, store);
 }
 
-}  // namespace
-
-void CudaBackend::trace_cwbvh(const CwbvhCall& call) {
-    const Launch launch{call.tree,   call.rays,    call.count,
-                        call.kernel, call.scratch, static_cast<cudaStream_t>(call.stream)};
+void trace(const DeviceBackend::CwbvhCall& call, CudaEvent* before, CudaEvent* behind) {
+    check_cwbvh_launch(call);
+    const Launch launch{call, static_cast<cudaStream_t>(call.stream), before, behind};
     if (call.occluded == nullptr)
         launch_rays<false>(launch, kernels::StoreHit{call.hits});
     else
         launch_rays<true>(launch, kernels::StoreOccluded{call.occluded});
 }
 
+}  // namespace
+
+void CudaBackend::trace_cwbvh(const CwbvhCall& call) {
+    static_cast<void>(name());  // says what is missing
+    trace(call, nullptr, nullptr);
+}
+
 double CudaBackend::time_cwbvh(const CwbvhCall& call) {
     static_cast<void>(name());
     CudaEvent start, stop;
-    start.record(call.stream);
-    trace_cwbvh(call);
-    stop.record(call.stream);
+    trace(call, &start, &stop);
     return stop.ms_since(start);
 }
 

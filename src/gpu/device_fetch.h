@@ -7,6 +7,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <exception>
 
 namespace raydix {
 
@@ -30,11 +31,20 @@ template <class Counts>
     return counts;
 }
 
-/// Complete once the stream has been waited for.
+/// Complete once the stream has been waited for. If it throws, the stream has been: what was
+/// fetched before may be freed.
 template <class T>
 void fetch(Buffer<T>& out, const T* device, std::size_t size, Stream stream) {
-    out.reset(size);
-    detail::copy_to_host(out.data(), device, size * sizeof(T), stream);
+    try {
+        out.reset(size);
+        detail::copy_to_host(out.data(), device, size * sizeof(T), stream);
+    } catch (...) {
+        try {
+            synchronize(stream);
+        } catch (const std::exception&) {  // the first failure is the one to tell
+        }
+        throw;
+    }
 }
 
 }  // namespace raydix

@@ -3,11 +3,32 @@
 #include <raydix/error.h>
 
 #include <algorithm>
+#include <map>
+#include <mutex>
 
+#include "exec/cuda_device.cuh"
 #include "exec/cuda_event.cuh"
 #include "gpu/cuda_backend.h"
 
 namespace raydix {
+namespace {
+
+__global__ void any_kernel() {}
+
+/// The current GPU, asked once: properties take long, and a kernel is loaded.
+CudaFound found_device() {
+    static std::mutex lock;
+    static std::map<int, CudaFound> known;
+    int device = 0;
+    RAYDIX_CUDA_TRY(cudaGetDevice(&device));
+    const std::lock_guard guard(lock);
+    const auto at = known.find(device);
+    if (at != known.end()) return at->second;
+    const void* kernel = reinterpret_cast<const void*>(any_kernel);
+    return known.emplace(device, find_cuda_device(kernel, {__CUDA_ARCH_LIST__})).first->second;
+}
+
+}  // namespace
 
 std::string CudaBackend::name() {
     int devices = 0;
@@ -18,15 +39,17 @@ std::string CudaBackend::name() {
             std::string("no CUDA device: ") +
             (status == cudaSuccess ? "none found" : cudaGetErrorString(status)));
     }
-    int current = 0;
-    RAYDIX_CUDA_TRY(cudaGetDevice(&current));
-    cudaDeviceProp properties{};
-    RAYDIX_CUDA_TRY(cudaGetDeviceProperties(&properties, current));
-    return properties.name;
+    const CudaFound found = found_device();
+    if (!found.missing.empty()) throw BackendUnavailable(found.missing);
+    return found.name;
 }
 
+int CudaBackend::enter(const void* memory) { return enter_cuda_device(memory); }
+void CudaBackend::leave(int before) noexcept { leave_cuda_device(before); }
+int CudaBackend::current() { return cuda_device_of(nullptr); }
+
 void CudaBackend::synchronize(Stream stream) {
-    RAYDIX_CUDA_TRY(cudaStreamSynchronize(static_cast<cudaStream_t>(stream)));
+    synchronize_cuda(static_cast<cudaStream_t>(stream));
 }
 
 double CudaBackend::measure_copy(std::size_t bytes, int repeat) {

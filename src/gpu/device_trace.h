@@ -117,7 +117,8 @@ inline std::unique_ptr<DeviceWarpTree::Arrays> upload_warp_tree(const WarpTree& 
     return arrays;
 }
 
-/// A tree that was built on the device, in the kernels' form. Waits for its counts.
+/// A tree that was built on the device, in the kernels' form. Waits for its counts and for the
+/// triangles: rays may come on another stream.
 template <class Launcher>
 std::unique_ptr<DeviceWarpTree::Arrays> take_warp_tree(Launcher& launcher, const DeviceTree& tree,
                                                        Stream stream) {
@@ -134,6 +135,7 @@ std::unique_ptr<DeviceWarpTree::Arrays> take_warp_tree(Launcher& launcher, const
     arrays->own_triangles.reset(n * sizeof(WoopTriangle));
     auto* maps = reinterpret_cast<WoopTriangle*>(arrays->own_triangles.data());
     launcher.launch("layout.woop", n, EmitWoopTriangle{tree.triangles, maps});
+    synchronize(stream);
     arrays->scene = {tree.pairs, maps, tree.pair_ids};
     return arrays;
 }

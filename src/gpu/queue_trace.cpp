@@ -97,7 +97,7 @@ DeviceTraceMs QueueBackend::time_warps(const DeviceWarpTree& tree, std::span<con
 }
 
 void QueueBackend::trace_cwbvh(const CwbvhCall& call) {
-    check_cwbvh_launch(call.tree, call.count, call.kernel, call.scratch);
+    check_cwbvh_launch(call);
     if (call.count == 0) return;
     QueueLauncher launcher = plain_launcher(call.stream);
     const bool any = call.occluded != nullptr;

@@ -92,6 +92,8 @@ private:
             return (arrived >> lane & 1) != 0 &&
                    (last_[lane] - first_[lane] + 1 > hploc_list || is_root(lane));
         });
+        // A lane that met the other child in climb() alone has acquired what its warp wrote.
+        if (merging != 0) warp_.sync();
         for (; merging != 0; merging &= merging - 1) {
             const std::uint32_t lane = nth_set_bit(merging, 0);
             merge_children(warp_.broadcast(first_, lane), warp_.broadcast(split_, lane),

@@ -79,13 +79,25 @@ def faults_of(kernels, machine):
                 yield f"{name}: {what} is {given[what]}, not {wanted}"
 
 
+def faults_of_version(readelf, code_object):
+    """Every ROCm since 5.0 loads code objects of version 4; in ELF's header that is a 2. Their kernels find the size of their
+    groups without hidden arguments, which are others in each version."""
+    version = pathlib.Path(code_object).read_bytes()[8]
+    if version != 2:
+        yield f"the code object's EI_ABIVERSION is {version}, not 2 (version 4)"
+    notes = subprocess.run([readelf, "--notes", code_object], check=True, capture_output=True, text=True).stdout
+    hidden = sorted(set(re.findall(r"hidden_\w+", notes)))
+    if hidden:
+        yield f"kernels have hidden arguments: {', '.join(hidden)}"
+
+
 def check(readelf, code_object, expected):
     architecture = pathlib.Path(code_object).stem
     machine = MACHINES[architecture]
     kernels = kernels_of(readelf, code_object)
     faults = [f"{name} was not compiled" for name in sorted(expected - kernels.keys())]
     faults += [f"{name} is no kernel of the SPIR-V modules" for name in sorted(kernels.keys() - expected)]
-    faults += faults_of(kernels, machine)
+    faults += [*faults_of(kernels, machine), *faults_of_version(readelf, code_object)]
     print(f"{architecture}: {len(kernels)} kernels\n{'not the common figures':<48}{'vector':>7}{'scalar':>7}{'spilled':>8}{'waves':>6}"
           f"{'stack':>6}{'shared':>7}")
     for name, given in sorted(kernels.items()):

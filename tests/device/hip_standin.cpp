@@ -17,6 +17,7 @@
 #include "device/standin/standin.h"
 #include "exec/code_object.h"
 #include "exec/hip_device.h"
+#include "gpu/device_fetch.h"
 #include "support/ray_sets.h"
 #include "support/scenes.h"
 #include "support/support.h"
@@ -201,6 +202,32 @@ TEST_F(HipStandIn, StreamsAreTheCallers) {
     synchronize(mine);
     EXPECT_EQ(tree_hash(tree.download()), tree_hash(build_bvh(scene.mesh(), options)));
     EXPECT_EQ(hip_api().StreamDestroy(mine), hip_success);
+}
+
+/// A tree in the kernels' form may be traced on another stream at once.
+TEST_F(HipStandIn, ATreeIsWholeWhenItIsMade) {
+    select_device("hip");
+    const Model scene = scene_of(random_soup(500, 6, 0.3f), "soup");
+    const Uploaded input(scene.mesh());
+    DeviceBvh tree(input.kind(), input.count(), {.builder = Builder::karras}, true);
+    tree.build(input.mesh);
+    fail("hipStreamSynchronize", 719, 1);  // the first wait is for the counts
+    EXPECT_NE(fault<DeviceError>([&] { DeviceWarpTree(tree.tree()); }), "");
+}
+
+/// Copies that were put on a stream end before the memory that they write is freed.
+TEST_F(HipStandIn, ACopyThatFailsWaitsForThoseBefore) {
+    select_device("hip");
+    const std::vector<std::uint32_t> values(1000, 7);
+    const DeviceBuffer<std::uint32_t> there{std::span<const std::uint32_t>(values)};
+    Buffer<std::uint32_t> first, second;
+    fetch(first, there.data(), values.size(), nullptr);
+    auto waits = figures().waits;
+    EXPECT_THROW(fetch(second, there.data(), std::size_t{1} << 60, nullptr), std::bad_alloc);
+    EXPECT_EQ(figures().waits, waits + 1);
+    fail("hipMemcpyAsync", 719);
+    EXPECT_THROW(fetch(second, there.data(), values.size(), nullptr), DeviceError);
+    EXPECT_EQ(figures().waits, waits + 2);
 }
 
 TEST_F(HipStandIn, CallsThatFailSayWhichAndLeaveNothing) {

@@ -86,7 +86,7 @@ struct HplocResult {
 };
 
 TEST(LaneWarp, MergesClustersAsTheHostDoes) {
-    for (const std::uint32_t n : {2u, 33u, 100u}) {
+    for (const std::uint32_t n : {2u, 33u, 400u}) {
         SCOPED_TRACE(std::to_string(n) + " primitives, seed " + std::to_string(n));
         const HplocInput input(n, n);
         HostLauncher<> host;

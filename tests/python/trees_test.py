@@ -10,6 +10,7 @@ import pytest
 import support
 
 import raydix
+from raydix.devices import DeviceRays
 from raydix.trees import BVH_NODE, KD_NODE, OCTREE_NODE
 
 
@@ -187,6 +188,25 @@ def test_the_simulator(figure):
     assert short["kernel"] == "short_stack" and short["hits"] == wide["hits"]
     with pytest.raises(raydix.InputError, match="gtx480"):
         raydix.simulate(figure, rays, machine="abacus")
+
+
+def test_rays_on_another_gpu_are_refused():
+    class RaysThere:
+        """As an array of a library for GPUs; nothing of it is read."""
+
+        shape, dtype = (3, 8), "float32"
+
+        def __dlpack_device__(self):
+            return 2, 1
+
+    class Core:
+        gpu = 0
+
+    rays = DeviceRays.__new__(DeviceRays)
+    rays._core, rays._is_cuda = Core(), True
+    for call in (rays.intersect, rays.occluded):
+        with pytest.raises(ValueError, match="rays: expected an array on GPU 0, .* on GPU 1"):
+            call(RaysThere(), None, None, None, 0xFFFFFFFF, None, 0)
 
 
 def test_devices():

@@ -110,7 +110,8 @@ private:
     }
 };
 
-/// Launches of warps and tiles, one warp after the other, by 32 threads; others by the host.
+/// Launches of warps and tiles: two warps at a time, of 32 threads each; others by the host. What a
+/// lane learns of the other warp the rest of its own does not know before a sync.
 class LaneLauncher : public HostLauncher<> {
 public:
     template <class Work>
@@ -120,11 +121,16 @@ public:
     }
     template <class Work>
     void launch_tiles(const char*, std::uint32_t n, const Work& work) {
-        LaneBoard board;
-        std::atomic<std::uint32_t> next_lane{0};
-        crew_.run(warp_lanes - 1, [&] {
-            LaneWarp::self = {&board, next_lane.fetch_add(1, std::memory_order_relaxed), 0};
-            for (std::uint32_t w = 0; w < n; ++w) work(LaneWarp(), w);
+        constexpr std::uint32_t at_a_time = 2, threads = at_a_time * warp_lanes;
+        LaneBoard boards[at_a_time];
+        std::atomic<std::uint32_t> next_thread{0};
+        crew_.run(threads - 1, [&] {
+            const std::uint32_t thread = next_thread.fetch_add(1, std::memory_order_relaxed);
+            // No warp ends before another begins: to begin orders memory.
+            while (next_thread.load(std::memory_order_relaxed) < threads) std::this_thread::yield();
+            const std::uint32_t first = thread / warp_lanes;
+            LaneWarp::self = {&boards[first], thread % warp_lanes, 0};
+            for (std::uint32_t w = first; w < n; w += at_a_time) work(LaneWarp(), w);
         });
     }
 

@@ -13,6 +13,8 @@ namespace raydix::standin {
 namespace {
 
 constexpr std::uint16_t machine_amdgpu = 224;
+constexpr unsigned char version_4 =
+    2;  // of code objects, the newest that ROCm 5.0 is known to load
 constexpr std::uint32_t note_metadata = 32;
 
 /// A value of MessagePack, as far as metadata use it.
@@ -153,7 +155,8 @@ std::set<std::string> symbols_of(const char* image, const Elf64_Ehdr& header) {
 std::optional<CodeObject> read_code_object(const char* image) {
     const auto header = at<Elf64_Ehdr>(image, 0);
     if (std::memcmp(header.e_ident, ELFMAG, SELFMAG) != 0 ||
-        header.e_ident[EI_CLASS] != ELFCLASS64 || header.e_machine != machine_amdgpu)
+        header.e_ident[EI_CLASS] != ELFCLASS64 || header.e_machine != machine_amdgpu ||
+        header.e_ident[EI_ABIVERSION] != version_4)
         return {};
     try {
         const Value metadata = Reader(metadata_of(image, header)).value();

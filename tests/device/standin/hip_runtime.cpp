@@ -38,7 +38,7 @@ struct State {
     std::vector<std::string> architectures{"gfx90a", "gfx1100"};
     std::map<std::string, Failure, std::less<>> failures;
     std::set<void*> memory, modules, streams;
-    std::uint64_t launches = 0, kernels_of_module = 0;
+    std::uint64_t launches = 0, waits = 0, kernels_of_module = 0;
 };
 State& state() {
     static auto& all = *new State;
@@ -137,8 +137,9 @@ void standin_heal() {
 }
 void standin_figures(Figures* figures) {
     const std::lock_guard guard(state().lock);
-    *figures = {state().memory.size(), state().modules.size(),    state().streams.size(),
-                state().launches,      state().kernels_of_module, spirv_kernels().size()};
+    *figures = {state().memory.size(), state().modules.size(), state().streams.size(),
+                state().launches,      state().waits,          state().kernels_of_module,
+                spirv_kernels().size()};
 }
 
 HipStatus hipInit(unsigned) { return planned("hipInit"); }
@@ -291,6 +292,8 @@ HipStatus hipStreamCreateWithFlags(HipStream* stream, unsigned flags) {
 HipStatus hipStreamSynchronize(HipStream stream) {
     try {  // a wait that a test makes fail has waited too
         device().finish(queue_of(stream));
+        const std::lock_guard guard(state().lock);
+        ++state().waits;
     } catch (const std::exception&) {
         return launch_failure;
     }

@@ -8,7 +8,7 @@ namespace raydix::standin {
 
 struct Figures {
     std::uint64_t allocations, modules, streams;  // that live
-    std::uint64_t launches;                       // so far
+    std::uint64_t launches, waits;                // so far; waits for streams
     std::uint64_t kernels_of_module;              // of the last one that was loaded, with a kernel
                                                   // of SPIR-V each
     std::uint64_t kernels_of_spirv;
