@@ -105,6 +105,7 @@ private:
                 fail("geometries", name_of(k) + ": geometry " + std::to_string(geometry.id) +
                                        " is mesh " + std::to_string(geometry.number) +
                                        " out of the order of its tree");
+            mesh.mask = geometry.mask;  // a commit finds them under one, or not at all
             mesh.ids.push_back(geometry.id);
             mesh.first.push_back(static_cast<std::uint32_t>(mesh.triangles));
             mesh.triangles += meshes_[geometry.number].triangles.size();
@@ -122,6 +123,7 @@ private:
                                   name_of(k) + " has");
             mesh->set_tree(tree.wide);
             mesh->sah_at_build = tree.sah_at_build;
+            mesh->left_out = tree.wide->stats().left_out;
             mesh->make_buckets();
             out->meshes.push_back(std::move(mesh));
         }
