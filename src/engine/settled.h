@@ -33,8 +33,7 @@ auto scenes_below(const Geometries& geometries, const Tree& tree) {
         scenes.emplace_back(geometries.at(instance.id).scene.get(), last);
     }
     std::ranges::sort(scenes);
-    const auto rest = std::ranges::unique(scenes);
-    scenes.erase(rest.begin(), rest.end());
+    scenes.erase(std::unique(scenes.begin(), scenes.end()), scenes.end());
     return scenes;
 }
 
