@@ -11,6 +11,7 @@
 #include "engine/shape_tree.h"
 #include "exec/parallel.h"
 #include "exec/recycler.h"
+#include "exec/thread_own.h"
 #include "layout/wide_refit.h"
 #include "tree/build_by_quality.h"
 
@@ -26,7 +27,8 @@ constexpr double wild_error = 0x1p-12;
 struct WideMaker {
     Recycler<WideBvhBuilder> builders;  // copies share what is kept
 
-    /// A second build of the same meshes tells that more may come: from then on memory is kept.
+    /// A second build of the same meshes tells that more may come: from then on memory is kept. Of
+    /// few triangles it is little, and there may be many such meshes: threads keep it.
     void build(const MeshView& mesh, const SceneOptions& options, const MeshTree* last,
                MeshTree& out) {
         if (last != nullptr) out.memory = last->memory;
@@ -34,6 +36,11 @@ struct WideMaker {
             options.quality, options.threads, mesh.triangles.size(),
             [&](const BuildOptions& build) {
                 std::unique_ptr<WideBvh> tree = taken_or_new(out.memory);
+                if (mesh.triangles.size() <= few_triangles) {
+                    const ThreadOwn<WideBvhBuilder> builder;
+                    builder->build(mesh, build, *tree, {.compact = options.compact});
+                    return tree;
+                }
                 std::unique_ptr<WideBvhBuilder> builder = taken_or_new(builders);
                 builder->build(mesh, build, *tree, {.compact = options.compact});
                 if (last != nullptr) builders.give(std::move(builder));

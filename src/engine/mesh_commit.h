@@ -49,24 +49,59 @@ public:
     /// The trees. `parts`: how many other parts the tree over all of them has, for what is told of
     /// progress: a part counts as a triangle.
     std::vector<std::shared_ptr<const MeshTree>> run(double parts) {
-        std::vector<std::shared_ptr<const MeshTree>> trees;
         const std::vector<Group> groups = groups_of(options_.usage);
-        trees.reserve(groups.size());
-        double work = static_cast<double>(groups.size()) + parts, done = 0;
-        for (const Group& group : groups) work += work_of(group);
-        for (const Group& group : groups) {
-            const double after = done + work_of(group);
+        double work = static_cast<double>(groups.size()) + parts, done = 0, small_work = 0;
+        std::vector<std::size_t> large, small;
+        for (std::size_t k = 0; k < groups.size(); ++k) {
+            const double triangles = work_of(groups[k]);
+            work += triangles;
+            const bool is_small = triangles <= few_to_share;
+            if (is_small) small_work += triangles;
+            (is_small ? small : large).push_back(k);
+        }
+        std::vector<Made> made(groups.size());
+        // Threads share the work within a large mesh, but one of few triangles is too little.
+        if (small.size() == 1) {
+            large.insert(std::ranges::lower_bound(large, small.front()), small.front());
+            small.clear();
+        }
+        for (const std::size_t k : large) {
+            const double after = done + work_of(groups[k]);
             const ProgressStage stage(done / work, after / work);
-            trees.push_back(tree_of(group));
+            made[k] = tree_of(groups[k]);
             progress_at(1);
             done = after;
         }
+        if (!small.empty()) {
+            const double after = done + small_work;
+            const bool all_have_some = small.size() >= static_cast<std::size_t>(thread_count());
+            const ProgressCounter counter(small_work, done / work, after / work);
+            for_each_index(
+                small.size(),
+                [&](std::size_t k) {
+                    const ProgressStage silent(ProgressSpan{});
+                    std::optional<LoopsStayHere> alone;
+                    if (all_have_some) alone.emplace();
+                    const Group& group = groups[small[k]];
+                    made[small[k]] = tree_of(group);
+                    counter.add(work_of(group));
+                },
+                1);
+            done = after;
+        }
         done_ = work > 0 ? done / work : 1;
-        for (const auto& tree : trees) {
-            report_.meshes += tree->ids.size();
-            report_.triangles += tree->triangles;
-            report_.left_out += tree->left_out;
-            if (options_.strict && tree->left_out != 0) refuse(*tree);
+        std::vector<std::shared_ptr<const MeshTree>> trees;
+        trees.reserve(groups.size());
+        for (const Made& one : made) {
+            const MeshTree& tree = *one.tree;
+            report_.meshes += tree.ids.size();
+            report_.triangles += tree.triangles;
+            report_.left_out += tree.left_out;
+            report_.trees_built += one.built;
+            report_.trees_refitted += one.refitted;
+            report_.sah_ratio = std::max(report_.sah_ratio, one.sah_ratio);
+            if (options_.strict && tree.left_out != 0) refuse(tree);
+            trees.push_back(one.tree);
         }
         return trees;
     }
@@ -86,6 +121,14 @@ private:
         [[nodiscard]] std::uint32_t mask() const { return members.front().second->mask; }
         [[nodiscard]] std::uint32_t first_id() const { return members.front().first; }
     };
+
+    /// What became of a group. Groups are at work on several threads at once.
+    struct Made {
+        std::shared_ptr<const MeshTree> tree = {};
+        bool built = false, refitted = false;
+        double sah_ratio = 0;  // 0: no refit was tried
+    };
+    static constexpr double few_to_share = 4096;  // triangles
 
     /// By ascending id of their first mesh.
     std::vector<Group> groups_of(Usage usage) {
@@ -151,26 +194,29 @@ private:
         return static_cast<double>(triangles);
     }
 
-    std::shared_ptr<const MeshTree> tree_of(const Group& group) {
-        if (!group.changed && group.last->mask == group.mask()) return group.last;
+    Made tree_of(const Group& group) {
+        if (!group.changed && group.last->mask == group.mask()) return {group.last};
+        Made made;
         std::shared_ptr<MeshTree> out;
         if (!group.changed) {
             out = std::make_shared<MeshTree>(*group.last);
         } else {
             out = std::make_shared<MeshTree>();
             for (const auto& [id, geometry] : group.members) out->ids.push_back(id);
-            if (!refit(group, *out)) build(group, *out);
+            made.refitted = refit(group, *out, made.sah_ratio);
+            made.built = !made.refitted;
+            if (made.built) build(group, *out);
             if (options_.usage == Usage::moving && group.last != nullptr)
                 Maker::share_rates(*group.last, *out);
             out->left_out = Maker::left_out(*out);
             out->make_buckets();
         }
         out->mask = group.mask();
-        return out;
+        made.tree = std::move(out);
+        return made;
     }
 
     void build(const Group& group, MeshTree& out) {
-        ++report_.trees_built;
         if (group.members.size() == 1) {
             const MeshView& mesh = group.members.front().second->mesh;
             out.first = {0};
@@ -193,8 +239,9 @@ private:
         }
     }
 
-    /// The last tree around one mesh whose vertices moved, if it is still good enough.
-    bool refit(const Group& group, MeshTree& out) {
+    /// The last tree around one mesh whose vertices moved, if it is still good enough. `ratio`: of
+    /// its SAH to that at its build.
+    bool refit(const Group& group, MeshTree& out, double& ratio) {
         if (options_.usage != Usage::moving || options_.refit_limit < 1 ||
             group.members.size() != 1)
             return false;
@@ -204,10 +251,9 @@ private:
         out.sah_at_build = old->sah_at_build;
         const std::optional<double> now = Maker::refit(*old, mesh, options_, out);
         if (!now) return false;
-        const double then = out.sah_at_build, ratio = *now > 0 && then > 0 ? *now / then : 1.0;
-        report_.sah_ratio = std::max(report_.sah_ratio, ratio);
+        const double then = out.sah_at_build;
+        ratio = *now > 0 && then > 0 ? *now / then : 1.0;
         if (ratio > options_.refit_limit) return false;
-        ++report_.trees_refitted;
         out.first = {0};
         out.triangles = mesh.triangles.size();
         return true;

@@ -75,19 +75,20 @@ HWY_INLINE WideBest accepted_in_mesh(const WideView& view, const SingleFrame& fr
 struct FilterOfOneRay {
     const MeshTree& mesh;
     const HitFilter& filter;
+    std::size_t place;
 
     static bool accepts(const void* context, const Ray* ray, const TreeHit& hit) {
         const auto& ask = *static_cast<const FilterOfOneRay*>(context);
-        return ask.filter(0, *ray, hit_in_scene(ask.mesh, 0, 1.0, hit));
+        return ask.filter(ask.place, *ray, hit_in_scene(ask.mesh, 0, 1.0, hit));
     }
 };
 
 template <bool any>
 Hit accepted_hit_of_mesh(const MeshTree& mesh, const Ray& ray, const HitFilter& filter,
-                         const WideStackView& stack, CallHistory& history) {
+                         std::size_t place, const WideStackView& stack, CallHistory& history) {
     SingleFrame frame;
     if (mesh.tree->empty() || !fill_frame(mesh.view, ray, frame)) return {};
-    const FilterOfOneRay ask{mesh, filter};
+    const FilterOfOneRay ask{mesh, filter, place};
     const HitCheck check{&FilterOfOneRay::accepts, &ask};
     WideBest best;
     if (mesh.view.is_compact) {
@@ -107,10 +108,11 @@ Hit accepted_hit_of_mesh(const MeshTree& mesh, const Ray& ray, const HitFilter& 
 /// A ray alone; for any hit only prim has a meaning.
 template <bool any>
 Hit hit_of_scene(const SceneTree& scene, const Ray& ray, std::uint32_t mask,
-                 const HitFilter* filter, const WideStackView& stack, CallHistory& history) {
+                 const HitFilter* filter, std::size_t place, const WideStackView& stack,
+                 CallHistory& history) {
     if (const MeshTree* const mesh = scene.only_mesh(); mesh != nullptr && filter != nullptr) {
         if ((mesh->mask & mask) == 0) return {};
-        return accepted_hit_of_mesh<any>(*mesh, ray, *filter, stack, history);
+        return accepted_hit_of_mesh<any>(*mesh, ray, *filter, place, stack, history);
     }
     if (!is_valid(ray)) return {};
     const SceneJob::Limits limits{ray.tmin, ray.tmax, mask};
@@ -120,11 +122,12 @@ Hit hit_of_scene(const SceneTree& scene, const Ray& ray, std::uint32_t mask,
         return one.best();
     };
     if (filter != nullptr) {
-        SceneRay<any ? Wanted::any_accepted : Wanted::closest_accepted> one(limits, 0, {}, stack);
+        SceneRay<any ? Wanted::any_accepted : Wanted::closest_accepted> one(limits, place, {},
+                                                                            stack);
         one.filter_by(*filter, ray);
         return walk(one);
     }
-    SceneRay<any ? Wanted::any : Wanted::closest> one(limits, 0, {}, stack);
+    SceneRay<any ? Wanted::any : Wanted::closest> one(limits, place, {}, stack);
     return walk(one);
 }
 

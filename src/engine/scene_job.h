@@ -160,11 +160,12 @@ struct SceneKernels {
     void (*trace)(SceneJob& job);
     void (*all_hits)(SceneJob& job);
     void (*steps)(SceneJob& job);
-    /// `filter` may be null; `stack` has room for SceneTree::stack_size; `history`: of the calls
-    /// of this thread. For any hit only prim has a meaning.
+    /// `filter` may be null; `place`: of the ray among the caller's; `stack` has room for
+    /// SceneTree::stack_size; `history`: of the calls of this thread. For any hit only prim has a
+    /// meaning.
     using OneRayOfScene = Hit(const SceneTree& scene, const Ray& ray, std::uint32_t mask,
-                              const HitFilter* filter, const WideStackView& stack,
-                              CallHistory& history);
+                              const HitFilter* filter, std::size_t place,
+                              const WideStackView& stack, CallHistory& history);
     OneRayOfScene* closest;
     OneRayOfScene* any;
 };

@@ -229,36 +229,65 @@ const MeshTree* visible_mesh(const SceneTree& tree, const SceneTraceOptions& opt
     return seen ? mesh : nullptr;
 }
 
+/// A ray alone through the parts of a scene.
+struct OneOfParts {
+    SceneKernels::OneRayOfScene* kernel;
+    const SceneTree& tree;
+    std::uint32_t mask;
+    const HitFilter* filter;
+    std::size_t place = 0;
+
+    /// In a plain environment.
+    [[nodiscard]] Hit trace(const Ray& ray) const {
+        constexpr std::size_t inside = 1024;
+        if (tree.stack_size > inside) {
+            StackMemory stack;
+            stack.reserve_words(tree.stack_size);
+            return kernel(tree, ray, mask, filter, place, stack.view(), call_history);
+        }
+        std::uint32_t words[inside];
+        float entries[inside];
+        return kernel(tree, ray, mask, filter, place, {words, entries}, call_history);
+    }
+};
+
+[[gnu::noinline]] Hit trace_parts(const SceneTree& tree, const Ray& ray, std::uint32_t mask,
+                                  const HitFilter* filter, bool any) {
+    static const SceneKernels& kernels = scene_kernels_for({});
+    const OneOfParts one{any ? kernels.any : kernels.closest, tree, mask, filter};
+    if (FloatEnvironment::is_plain()) return one.trace(ray);
+    const FloatEnvironment plain;
+    return one.trace(ray);
+}
+
+/// Rays through parts one by one, without a plan.
+TraceCounts trace_few(const SceneTree& tree, const Batch& batch) {
+    check_threads(batch.options.threads);
+    const SceneKernels& kernels = scene_kernels_for(batch.options.isa);
+    const FloatEnvironment plain;
+    OneOfParts one{batch.hits == nullptr ? kernels.any : kernels.closest, tree, 0,
+                   filter_of(batch.options)};
+    TraceCounts counts;
+    counts.rays = batch.rays.size();
+    for (; one.place < batch.rays.size(); ++one.place) {
+        const Ray& ray = batch.rays[one.place];
+        one.mask = batch.mask(one.place);
+        const Hit hit = one.trace(ray);
+        counts.hits += hit.hit();
+        counts.invalid_rays += !hit.hit() && !is_valid(ray);
+        batch.set(one.place, hit);
+    }
+    return counts;
+}
+
 TraceCounts trace_batch(const Scene& scene, const Batch& batch) {
     const SceneTree& tree = *SceneInternals::tree(scene);
     const SceneTraceOptions& options = batch.options;
     check_options(batch.rays.size(), options);
     static_cast<void>(kernels_for(options.isa));
-    const MeshTree* const mesh = visible_mesh(tree, options);
-    return mesh != nullptr ? trace_mesh(*mesh, batch) : trace_scene(tree, batch);
-}
-
-/// In a plain environment.
-Hit trace_parts_plainly(SceneKernels::OneRayOfScene* kernel, const SceneTree& tree, const Ray& ray,
-                        std::uint32_t mask, const HitFilter* filter) {
-    constexpr std::size_t inside = 1024;
-    if (tree.stack_size > inside) {
-        StackMemory stack;
-        stack.reserve_words(tree.stack_size);
-        return kernel(tree, ray, mask, filter, stack.view(), call_history);
-    }
-    std::uint32_t words[inside];
-    float entries[inside];
-    return kernel(tree, ray, mask, filter, {words, entries}, call_history);
-}
-
-[[gnu::noinline]] Hit trace_parts(const SceneTree& tree, const Ray& ray, std::uint32_t mask,
-                                  const HitFilter* filter, bool any) {
-    static const SceneKernels& kernels = scene_kernels_for({});
-    SceneKernels::OneRayOfScene* const kernel = any ? kernels.any : kernels.closest;
-    if (FloatEnvironment::is_plain()) return trace_parts_plainly(kernel, tree, ray, mask, filter);
-    const FloatEnvironment plain;
-    return trace_parts_plainly(kernel, tree, ray, mask, filter);
+    if (const MeshTree* const mesh = visible_mesh(tree, options)) return trace_mesh(*mesh, batch);
+    return are_few(batch.rays.size(), options.path) ? trace_few(tree, batch)
+                                                    : trace_scene(tree, batch);
 }
 
 /// The order by triangles of the tree is that by geometry and triangle.

@@ -34,6 +34,15 @@ struct Batch {
     std::uint8_t* occluded;
     const SceneTraceOptionsD& options;
 
+    [[nodiscard]] std::uint32_t mask(std::size_t i) const {
+        return options.masks.empty() ? options.mask : options.masks[i];
+    }
+    void set(std::size_t i, const HitD& hit) const {
+        if (hits != nullptr)
+            hits[i] = hit;
+        else
+            occluded[i] = hit.hit();
+    }
     /// Rays first to last - 1, of a batch without masks, or all.
     [[nodiscard]] Batch part(std::size_t first, std::size_t last) const {
         return {rays.subspan(first, last - first), hits == nullptr ? nullptr : hits + first,
@@ -156,10 +165,35 @@ Buffer<std::uint32_t> order_by_place(const WideTreeD& tree, std::span<const RayD
     return raydix::order_by_place(tree.arrays.bounds, places.view());
 }
 
+/// Rays one by one, without a plan.
+TraceCounts trace_few(const SceneTreeD& tree, const Batch& batch) {
+    check_threads(batch.options.threads);
+    const SceneKernelsD& kernels = scene_kernels_double_for(batch.options.isa);
+    SceneKernelsD::OneRayOfScene* const kernel =
+        batch.hits == nullptr ? kernels.any : kernels.closest;
+    const HitFilterD* const filter = filter_of(batch.options);
+    const ThreadOwn<SceneJobD> own;
+    own->stack.reserve_words(tree.stack_size);
+    const FloatEnvironment plain;
+    TraceCounts counts;
+    counts.rays = batch.rays.size();
+    for (std::size_t k = 0; k < batch.rays.size(); ++k) {
+        HitD hit;
+        if (is_valid(batch.rays[k]))
+            hit = kernel(tree, batch.rays[k], batch.mask(k), filter, k, own->stack.view());
+        else
+            ++counts.invalid_rays;
+        counts.hits += hit.hit();
+        batch.set(k, hit);
+    }
+    return counts;
+}
+
 TraceCounts trace_batch(const SceneD& scene, const Batch& batch) {
     const SceneTreeD& tree = checked_tree(scene, batch.rays.size(), batch.options);
-    const SceneKernelsD& kernels = scene_kernels_double_for(batch.options.isa);
     const std::size_t n = batch.rays.size();
+    if (are_few(n, batch.options.path)) return trace_few(tree, batch);
+    const SceneKernelsD& kernels = scene_kernels_double_for(batch.options.isa);
     const Plan plan(tree, batch);
     JobCounts sum;
     with_threads(batch.options.threads, [&] {

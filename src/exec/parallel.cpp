@@ -69,6 +69,10 @@ void run_here(const std::function<void()>& body) {
 void with_threads(int threads, const std::function<void()>& body) {
     check_threads(threads);
     const FloatEnvironment plain;
+    if (detail::loops_stay) {
+        body();
+        return;
+    }
     if (pool_is_used()) {
         with_job_limit(threads, body);
         return;
@@ -105,6 +109,7 @@ void isolated(const std::function<void()>& body) {
 }
 
 int thread_count() {
+    if (detail::loops_stay) return 1;
     if (pool_is_used()) return pool_threads();
     return onetbb_serves() ? tbb::this_task_arena::max_concurrency() : 1;
 }

@@ -24,9 +24,10 @@ void with_threads(int threads, const std::function<void()>& body);
 void isolated(const std::function<void()>& body);
 
 namespace detail {
+inline constinit thread_local bool loops_stay = false;
 void parallel_ranges(std::size_t n, std::size_t grain,
                      void (*call)(const void*, std::size_t, std::size_t), const void* body);
-}
+}  // namespace detail
 
 /// Calls body(begin, end) for ranges that cover [0, n), each at least `grain` long unless n is
 /// less. What a body throws comes out, and other ranges may then be left out. Loops that bodies run
@@ -59,6 +60,19 @@ void for_each_index_to_the_end(std::size_t n, const Body& body) {
         for (std::size_t i = 0; i < n; ++i) body(i);
     }
 }
+
+/// While it lives, the loops that this thread begins stay on it: for pieces of work so small that
+/// to share one would cost more than it gains, of which many are done side by side.
+class LoopsStayHere {
+public:
+    LoopsStayHere() { detail::loops_stay = true; }
+    ~LoopsStayHere() { detail::loops_stay = outer_; }
+    LoopsStayHere(const LoopsStayHere&) = delete;
+    LoopsStayHere& operator=(const LoopsStayHere&) = delete;
+
+private:
+    const bool outer_ = detail::loops_stay;
+};
 
 /// Splits [0, n) into fixed blocks that depend on n and `block` alone, never on the thread count,
 /// and calls body(block_index, begin, end): what is summed per block and then in order is the same

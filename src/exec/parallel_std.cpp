@@ -31,10 +31,14 @@ int most_threads() { return std::max(16, machine_threads()); }
 void with_threads(int threads, const std::function<void()>& body) {
     check_threads(threads);
     const FloatEnvironment plain;
-    with_job_limit(threads, body);
+    if (detail::loops_stay)
+        body();
+    else
+        with_job_limit(threads, body);
 }
 
 int thread_count() {
+    if (detail::loops_stay) return 1;
     return pool_is_used() ? pool_threads() : jobs_at_once(machine_threads(), most_threads());
 }
 

@@ -18,6 +18,7 @@ namespace raydix {
 
 /// Trees of so few triangles take so little time that all lower qualities are tried.
 inline constexpr std::size_t few_triangles = 1024;
+inline constexpr std::size_t too_few_to_share = 128;  // for threads
 /// In larger ones clustering was seen to cost more than the radix tree only where boxes lie in each
 /// other a hundredfold, as those of nested shells do. Wide trees of scans and rooms cost 5 to 28.
 /// Of binary trees the like is not known.
@@ -62,7 +63,7 @@ auto build_by_quality(Quality quality, int threads, std::size_t triangles, const
                 const ProgressStage stage(k == 0 ? progress : ProgressSpan{});
                 trees[k].emplace(build(qualities[k]));
             },
-            1);
+            triangles <= too_few_to_share ? trees.size() : 1);
     });
     return or_fast(std::move(**std::ranges::min_element(
         trees, {}, [&](const std::optional<Tree>& tree) { return sah_of(*tree); })));

@@ -83,33 +83,39 @@ private:
 
     /// The summed area of inner nodes; areas of all nodes but the root by bins.
     double measure() {
+        std::vector<std::uint32_t>& bins = s_.area_bins;
+        bins.assign(AreaBins::count, 0);
+        if (slots_ <= block_slots) return measure(0, slots_, bins.data());
         std::vector<double> sums((slots_ + block_slots - 1) / block_slots);
-        bins_.assign(AreaBins::count, 0);
         for_each_block(slots_, block_slots,
                        [&](std::size_t block, std::size_t begin, std::size_t end) {
                            std::array<std::uint32_t, AreaBins::count> own{};
-                           double sum = 0;
-                           for (std::size_t slot = begin; slot < end; ++slot) {
-                               if (slot == 1) continue;
-                               if (slot != 0) ++own[AreaBins::of(area(slot))];
-                               const BvhNode& node = tree_.nodes[slot];
-                               if (!node.is_leaf()) sum += half_area({node.lo, node.hi});
-                           }
-                           sums[block] = sum;
+                           sums[block] = measure(begin, end, own.data());
                            for (std::size_t bin = 0; bin < AreaBins::count; ++bin)
-                               if (own[bin] != 0) std::atomic_ref(bins_[bin]).fetch_add(own[bin]);
+                               if (own[bin] != 0) std::atomic_ref(bins[bin]).fetch_add(own[bin]);
                        });
         double total = 0;
         for (const double sum : sums) total += sum;
         return total;
     }
+    /// Of the slots begin to end - 1.
+    double measure(std::size_t begin, std::size_t end, std::uint32_t* bins) const {
+        double sum = 0;
+        for (std::size_t slot = begin; slot < end; ++slot) {
+            if (slot == 1) continue;
+            if (slot != 0) ++bins[AreaBins::of(area(slot))];
+            const BvhNode& node = tree_.nodes[slot];
+            if (!node.is_leaf()) sum += half_area({node.lo, node.hi});
+        }
+        return sum;
+    }
 
     /// Slots of the largest areas, ascending: a whole number of bins, without nodes that have none.
     std::span<const std::uint32_t> pick_candidates() {
         const auto wanted = static_cast<std::uint32_t>(options_.part * slots_) + 1;
-        std::size_t least_bin = AreaBins::count;
+        std::size_t least_bin = AreaBins::of(area(0)) + 1;  // no node is larger than the root
         std::uint32_t picked = 0;
-        while (least_bin > 1 && picked < wanted) picked += bins_[--least_bin];
+        while (least_bin > 1 && picked < wanted) picked += s_.area_bins[--least_bin];
         const auto is_picked = [&](std::size_t slot) {
             return AreaBins::of(area(slot)) >= least_bin;
         };
@@ -271,7 +277,6 @@ private:
     ReinsertionScratch& s_;
     std::uint32_t slots_;
     LinkedTree tree_;
-    std::vector<std::uint32_t> bins_;
 };
 
 }  // namespace

@@ -30,6 +30,7 @@ struct ReinsertionScratch {
     Buffer<std::uint32_t> waiting;  // [inner + 1]: children to be fitted first, and marks
     Buffer<std::uint32_t> candidates, block_sums;
     Buffer<Insertion> found;
+    std::vector<std::uint32_t> area_bins;
 
     [[nodiscard]] std::size_t capacity_bytes() const;
 };

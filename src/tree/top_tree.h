@@ -5,6 +5,7 @@
 
 #include <raydix/bvh.h>
 
+#include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -32,6 +33,7 @@ struct TopTree {
     std::vector<BvhNode> nodes;
     std::vector<std::uint32_t> refs;   // [2 * inner + 2], of the large tree, by the slot made in
     std::vector<std::uint32_t> inner;  // [inner], of the large tree: what the top's nodes were
+    std::vector<std::uint32_t> next;   // [2 * inner + 2]: lists of slots, while the top is cut
 };
 
 /// `View`: root(), is_leaf(ref), box(ref), children(ref) and prefetch(ref) of a tree that is not
@@ -49,13 +51,10 @@ public:
         put(view_.root());
         top_.nodes.push_back({{0, 0, 0}, 0, {0, 0, 0}, 0});
         top_.refs.push_back(0);
-        for (std::size_t bin = AreaBins::count; bin-- > 0;)
-            while (!waiting_[bin].empty()) {
-                if (top_.inner.size() == most_inner) return;
-                const std::uint32_t slot = waiting_[bin].back();
-                waiting_[bin].pop_back();
-                open(slot);
-            }
+        while (waits()) {
+            if (top_.inner.size() == most_inner) return;
+            open(take_largest());
+        }
     }
 
 private:
@@ -74,12 +73,43 @@ private:
         top_.refs.push_back(ref);
         if (view_.is_leaf(ref)) return;
         view_.prefetch(ref);
-        waiting_[AreaBins::of(cluster_area(box))].push_back(slot);
+        wait(slot, AreaBins::of(cluster_area(box)));
+    }
+
+    // Of each bin a list, the last to come first. Small trees must not pay for bins that they do
+    // not use.
+    void wait(std::uint32_t slot, std::size_t bin) {
+        std::uint64_t& used = used_[bin / 64];
+        const std::uint64_t bit = std::uint64_t{1} << bin % 64;
+        top_.next.resize(slot + std::size_t{1});
+        top_.next[slot] = (used & bit) == 0 ? none : first_[bin];
+        first_[bin] = slot;
+        used |= bit;
+    }
+    /// Children are no larger than their parents, so bins empty from the last to the first.
+    [[nodiscard]] bool waits() {
+        while (used_[word_] == 0) {
+            if (word_ == 0) return false;
+            --word_;
+        }
+        return true;
+    }
+    [[nodiscard]] std::uint32_t take_largest() {
+        const std::size_t bit = static_cast<std::size_t>(std::bit_width(used_[word_])) - 1;
+        std::uint32_t& first = first_[64 * word_ + bit];
+        const std::uint32_t slot = first;
+        first = top_.next[slot];
+        if (first == none) used_[word_] &= ~(std::uint64_t{1} << bit);
+        return slot;
     }
 
     const View& view_;
     TopTree& top_;
-    std::vector<std::vector<std::uint32_t>> waiting_{AreaBins::count};
+    static constexpr std::uint32_t none = UINT32_MAX;
+    static constexpr std::size_t words = AreaBins::count / 64;
+    std::array<std::uint64_t, words> used_{};           // bits of the bins that hold a slot
+    std::array<std::uint32_t, AreaBins::count> first_;  // of those
+    std::size_t word_ = words - 1;
 };
 
 }  // namespace raydix

@@ -6,11 +6,13 @@
 #include <raydix/scene.h>
 #include <raydix/trace.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <cstring>
 #include <limits>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "base/math.h"
@@ -94,6 +96,51 @@ TEST(MovingMesh, RandomSequencesOfChangesAnswerAsNewScenes) {
             expect_like_a_new_one(scene, mesh, random);
         }
         EXPECT_GE(refitted, 2u);
+    }
+}
+
+/// Meshes of few triangles are side by side, each on one thread; large ones are one by one.
+TEST(MovingMesh, ManyMeshesOfAllSizesAreTheSameForEveryNumberOfThreads) {
+    test::Random random(8);
+    std::vector<Mesh> meshes;
+    for (std::uint32_t k = 0; k < 60; ++k) {
+        Mesh mesh = k % 20 == 7 ? figure(5000) : test::random_soup(k % 5 == 1 ? 700 : 12, k, 0.5f);
+        const Vec3 at = random.in(-3, 3);
+        for (Vec3& v : mesh.vertices) v = v + at;
+        meshes.push_back(std::move(mesh));
+    }
+    meshes[12].vertices[3].x = std::numeric_limits<float>::quiet_NaN();  // left out
+    const std::vector<Ray> rays = rays_into({{-3, -3, -3}, {4, 4, 4}}, random, 3000);
+    std::vector<std::vector<Hit>> hits;
+    std::vector<CommitReport> reports;
+    for (const int threads : {1, 2, 3, 8}) {
+        SceneOptions options = moving;
+        options.threads = threads;
+        Scene scene;
+        for (std::uint32_t k = 0; k < meshes.size(); ++k)
+            scene.add(meshes[k], {.mask = k % 3 == 0 ? 1u : 3u, .id = 100 - k});
+        reports.push_back(scene.commit(options));
+        hits.push_back(trace(scene, rays));
+        for (std::uint32_t k = 0; k < meshes.size(); k += 2) {
+            Mesh moved = meshes[k];
+            wave(meshes[k], 1.0f, k % 8 == 4 ? 3.0f : 0.1f, moved);  // many are built again
+            scene.update(100 - k, moved);
+        }
+        reports.push_back(scene.commit(options));
+        hits.push_back(trace(scene, rays));
+    }
+    EXPECT_EQ(reports[0].trees_built, 60u);
+    EXPECT_EQ(reports[0].left_out, 1u);
+    EXPECT_EQ(reports[1].trees_built + reports[1].trees_refitted, 30u);
+    EXPECT_GT(reports[1].trees_built, 0u);
+    EXPECT_GT(reports[1].trees_refitted, 10u);
+    for (std::size_t k = 2; k < hits.size(); ++k) {
+        EXPECT_TRUE(std::ranges::equal(hits[k], hits[k % 2], same)) << k;
+        EXPECT_EQ(reports[k].trees_built, reports[k % 2].trees_built);
+        EXPECT_EQ(reports[k].trees_refitted, reports[k % 2].trees_refitted);
+        EXPECT_EQ(reports[k].sah_ratio, reports[k % 2].sah_ratio);
+        EXPECT_EQ(reports[k].left_out, reports[k % 2].left_out);
+        EXPECT_EQ(reports[k].bytes, reports[k % 2].bytes);
     }
 }
 

@@ -73,6 +73,11 @@ HWY_INLINE AnyHit any_hit(D d, const Limits<D>& ray, const Sheared<D>& a, const 
     candidates &=
         ~bits_of(d, hn::Or(hn::Gt(least, hn::Add(last, pad)), hn::Lt(most, hn::Sub(first, pad))));
     if (early && candidates == 0) return {0, 0};
+    // Wholly between both ends. Strictly: an infinite depth tells nothing.
+    const std::uint32_t between =
+        candidates & clear &
+        bits_of(d, hn::And(hn::Lt(hn::Add(most, pad), last), hn::Gt(hn::Sub(least, pad), first)));
+    if (early && between == candidates) return {0, between};
     // (depth of the hit - least) * area is within `error` of `above`.
     const auto weighed = [&](V e, V z) { return hn::Mul(e, hn::Sub(z, least)); };
     const auto beside = [](const Sheared<D>& p) { return hn::Max(hn::Abs(p.x), hn::Abs(p.y)); };
@@ -97,7 +102,7 @@ HWY_INLINE AnyHit any_hit(D d, const Limits<D>& ray, const Sheared<D>& a, const 
         bits_of(d, hn::Or(hn::Gt(at_least, at_last), hn::Lt(at_most, at_first)));
     const std::uint32_t hits =
         bits_of(d, hn::And(hn::Le(at_most, at_last), hn::Ge(at_least, at_first)));
-    const std::uint32_t certain = candidates & known & clear & hits;
+    const std::uint32_t certain = between | (candidates & known & clear & hits);
     return {candidates & ~(known & misses) & ~certain, certain};
 }
 

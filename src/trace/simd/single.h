@@ -304,8 +304,7 @@ protected:
     HWY_INLINE bool test_triangles(std::uint32_t place, std::uint32_t count) {
         if constexpr (counting) counts_.tests += count;
         const TriangleBlock& block = tree_.template block<compact>(place);
-        const Candidates open = candidates_of(block, lanes_of(place, count));
-        return !open.none() && finish(block, open);
+        return finish(block, candidates_of(block, lanes_of(place, count)));
     }
     static HWY_INLINE std::uint32_t lanes_of(std::uint32_t place, std::uint32_t count) {
         return ((1u << count) - 1) << place % block_lanes;
@@ -325,7 +324,6 @@ protected:
     /// lanes none of whose edge functions is 0 or NaN.
     struct Candidates {
         std::uint32_t open = 0, clear = 0, certain = 0;
-        [[nodiscard]] bool none() const { return (open | certain) == 0; }
     };
 
     /// Calls with(a, b, c, u, v, w): the corners of a block as the ray sees them, and the three
@@ -364,13 +362,15 @@ protected:
     }
 
     /// The rest of intersect_triangle: the same bits. True: stop.
-    HWY_NOINLINE bool finish(const TriangleBlock& block, const Candidates& here) {
+    HWY_INLINE bool finish(const TriangleBlock& block, const Candidates& here) {
         if (wanted == Wanted::any && here.certain != 0) {
             best_.prim = 0;
             return true;
         }
-        std::uint32_t candidates = here.open;
-        const std::uint32_t clear = here.clear;
+        return here.open != 0 && finish_open(block, here.open, here.clear);
+    }
+    HWY_NOINLINE bool finish_open(const TriangleBlock& block, std::uint32_t candidates,
+                                  std::uint32_t clear) {
         for (; candidates != 0; candidates &= candidates - 1) {
             const auto lane = static_cast<std::uint32_t>(std::countr_zero(candidates));
             TriangleHit hit;

@@ -217,10 +217,36 @@ private:
     }
 };
 
+/// Rays one by one, without a plan.
+TraceCounts trace_few(const WideBvh& tree, std::span<const Ray> rays, HitRows hits,
+                      std::uint8_t* occluded, const TraceOptions& options, const RowsDone& done) {
+    check_threads(options.threads);
+    const SimdKernels& kernels = kernels_for(options.isa);
+    OneRay* const kernel = hits ? kernels.closest : kernels.any;
+    const WideView view = view_of(tree.arrays());
+    const std::size_t stack_size = wide_stack_capacity(tree.stats().max_depth);
+    const FloatEnvironment plain;
+    TraceCounts counts;
+    counts.rays = rays.size();
+    for (std::size_t k = 0; k < rays.size(); ++k) {
+        const TreeHit hit = one_ray_plainly(kernel, view, stack_size, rays[k]);
+        counts.hits += hit.hit();
+        counts.invalid_rays += !hit.hit() && !is_valid(rays[k]);
+        if (hits)
+            hits.put(k, hit);
+        else
+            occluded[k] = hit.hit();
+    }
+    if (done) done(0, nullptr, 0, rays.size());
+    return counts;
+}
+
 /// `done` comes for the rays of each job. `check`: of the hits that it accepts, or null.
 TraceCounts trace_batch(const WideBvh& tree, std::span<const Ray> rays, HitRows hits,
                         std::uint8_t* occluded, const TraceOptions& options, const RowsDone& done,
                         const HitCheck* check) {
+    if (are_few(rays.size(), options.path) && !options.counters && check == nullptr)
+        return trace_few(tree, rays, hits, occluded, options, done);
     const Plan plan(tree, rays, options, !hits, check == nullptr);
     const SimdKernels& kernels = kernels_for(options.isa);
     TraceCounts sum;

@@ -105,8 +105,7 @@ public:
     }
     HWY_INLINE void keep_hit() {
         if constexpr (wanted == Wanted::any) {
-            if (open_.certain != 0) best_.prim = 0;
-            if (open_.certain == 0 && open_.open != 0) this->finish(block(), open_);
+            this->finish(block(), open_);
             return;
         }
         const std::uint32_t others = open_.open & (open_.open - 1);
@@ -122,7 +121,7 @@ public:
             if (this->test_leaf(word_)) return false;
         } else if constexpr (tries) {
             if (wanted == Wanted::any && best_.found()) return false;
-        } else if (!open_.none() && this->finish(block(), open_)) {
+        } else if (this->finish(block(), open_)) {
             return false;
         }
         return pop();

@@ -31,6 +31,11 @@ struct BatchLook {
 /// A batch of so many rays or fewer is one job, on the caller's thread.
 inline constexpr std::size_t undivided_rays = 1024;
 
+/// Whether rays go one by one without a plan, which would cost them more than it gains.
+[[nodiscard]] inline bool are_few(std::size_t rays, SimdPath path) {
+    return rays < 8 && (path == SimdPath::automatic || path == SimdPath::single);
+}
+
 /// Rays 0 to n - 1 as jobs of this path, on the threads of the calling context. Streams have as
 /// many in a job as give full vectors deep in the tree and still lie in the second-level cache;
 /// fewer where the batch would not keep all threads busy. `counted`: visits are, so that jobs may
