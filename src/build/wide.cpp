@@ -11,6 +11,7 @@
 #include "exec/parallel.h"
 #include "exec/progress.h"
 #include "layout/cluster_view.h"
+#include "layout/local_pads.h"
 #include "layout/sorted_part.h"
 #include "layout/wide_bvh.h"
 #include "layout/wide_collapse.h"
@@ -56,6 +57,7 @@ WideBvh::WideBvh(const Bvh& bvh, const WideBvhOptions& options)
         Stopwatch watch;
         WideScratch scratch;
         make_wide_layout(bvh, collapse, *arrays_, scratch);
+        settle_local_pads(*arrays_);
         arrays_->stats.ms = arrays_->stats.layout_ms = watch.lap();
     });
 }
@@ -140,6 +142,7 @@ void WideBvhBuilder::build(const MeshView& mesh, const BuildOptions& options, Wi
     }
     arrays.stats.input_count = bvh.input_count();
     arrays.stats.left_out = bvh.left_out();
+    settle_local_pads(arrays);
     arrays.stats.layout_ms = layout_ms;
     arrays.stats.ms = watch.lap();
 }

@@ -51,20 +51,18 @@ public:
     std::vector<std::shared_ptr<const MeshTree>> run(double parts) {
         const std::vector<Group> groups = groups_of(options_.usage);
         double work = static_cast<double>(groups.size()) + parts, done = 0, small_work = 0;
+        for (const Group& group : groups) work += work_of(group);
+        // Threads share the work within a mesh. Of few triangles it is too little, but not if there
+        // are many such meshes.
+        const auto is_small = [](const Group& group) { return work_of(group) <= few_to_share; };
+        const bool side_by_side = std::ranges::count_if(groups, is_small) >= many_to_share;
         std::vector<std::size_t> large, small;
         for (std::size_t k = 0; k < groups.size(); ++k) {
-            const double triangles = work_of(groups[k]);
-            work += triangles;
-            const bool is_small = triangles <= few_to_share;
-            if (is_small) small_work += triangles;
-            (is_small ? small : large).push_back(k);
+            const bool with_others = side_by_side && is_small(groups[k]);
+            if (with_others) small_work += work_of(groups[k]);
+            (with_others ? small : large).push_back(k);
         }
         std::vector<Made> made(groups.size());
-        // Threads share the work within a large mesh, but one of few triangles is too little.
-        if (small.size() == 1) {
-            large.insert(std::ranges::lower_bound(large, small.front()), small.front());
-            small.clear();
-        }
         for (const std::size_t k : large) {
             const double after = done + work_of(groups[k]);
             const ProgressStage stage(done / work, after / work);
@@ -128,7 +126,8 @@ private:
         bool built = false, refitted = false;
         double sah_ratio = 0;  // 0: no refit was tried
     };
-    static constexpr double few_to_share = 4096;  // triangles
+    static constexpr double few_to_share = 4096;         // triangles
+    static constexpr std::ptrdiff_t many_to_share = 64;  // meshes
 
     /// By ascending id of their first mesh.
     std::vector<Group> groups_of(Usage usage) {

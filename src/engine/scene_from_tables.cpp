@@ -12,6 +12,7 @@
 #include "engine/scene_tables.h"
 #include "engine/table_reader.h"
 #include "exec/parallel.h"
+#include "layout/local_pads.h"
 #include "layout/wide_check.h"
 
 namespace raydix {
@@ -58,6 +59,7 @@ private:
                 throw InputError(*fault + " (" + name + ")");
             arrays->stats.sah = tree.sah;
             arrays->stats.widening = tree.widening;
+            settle_local_pads(*arrays);
             tree_of_.insert(tree_of_.end(), own.size(), trees_.size());
             trees_.push_back(
                 {std::make_shared<const WideBvh>(WideBvhInternals::tree_of(std::move(arrays))),

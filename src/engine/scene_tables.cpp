@@ -12,6 +12,7 @@
 #include "engine/shape_tree.h"
 #include "engine/shared_arrays.h"
 #include "exec/parallel.h"
+#include "layout/local_pads.h"
 
 namespace raydix {
 namespace {
@@ -113,6 +114,11 @@ private:
                               arrays.vertices.size(), arrays.bounds, arrays.stats.sah,
                               mesh.sah_at_build, arrays.stats.widening});
         out_.wide.push_back(mesh.tree.get());
+        if (arrays.local_pads && !compact)
+            out_.nodes.emplace_back(
+                out_.moved_nodes.emplace_back(nodes_about_center(arrays)).view());
+        else
+            out_.nodes.emplace_back(arrays.nodes.view());
         return known->second;
     }
 

@@ -2,6 +2,7 @@
 // files hold of scenes (docs/rdx-format.md), and the way back. In double without trees.
 #pragma once
 
+#include <raydix/buffer.h>
 #include <raydix/double.h>
 #include <raydix/mesh.h>
 #include <raydix/scene.h>
@@ -98,7 +99,9 @@ struct BasicSceneTables {
     std::vector<std::span<const BasicVec3<Scalar>>> points;
     // In float alone:
     std::vector<StoredTree> trees;
-    std::vector<const WideBvh*> wide;  // [trees]
+    std::vector<const WideBvh*> wide;              // [trees]
+    std::vector<std::span<const WideNode>> nodes;  // [trees], about the middle of the bounds
+    std::vector<Buffer<WideNode>> moved_nodes;     // of trees that have them about another point
 };
 using SceneTables = BasicSceneTables<float>;
 using SceneTablesD = BasicSceneTables<double>;

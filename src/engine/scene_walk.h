@@ -545,13 +545,14 @@ private:
         SimdCounts counts;
         if constexpr (all) {
             hits_.trace_mesh(job, level, mesh, place.number,
-                             count < least_together ? job_.kernels->single : job_.kernels->packets);
+                             count < least_together || view.local_pads ? job_.kernels->single
+                                                                       : job_.kernels->packets);
             return;
         }
         // Streams have no checks.
-        (count < least_together                   ? job_.kernels->single
-         : job_.packets || job_.filter != nullptr ? job_.kernels->packets
-                                                  : job_.kernels->streams)(job, counts);
+        (count < least_together || view.local_pads ? job_.kernels->single
+         : job_.packets || job_.filter != nullptr  ? job_.kernels->packets
+                                                   : job_.kernels->streams)(job, counts);
         if (counts.hits == 0) return;
         for (std::uint32_t k = 0; k < count; ++k) {
             const std::uint32_t ray = rays == nullptr ? k : rays[k];

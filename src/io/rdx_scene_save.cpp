@@ -37,7 +37,7 @@ std::array<rdx::SectionContent, rdx::shapes_section_count> contents_of(
             list_of(tables.taken),
             list_of(tables.trees),
             list_of(tables.meshes),
-            pieces_of<WideNode>(tables.wide, [](Wide w) { return w->arrays().nodes.view(); }),
+            pieces_of<WideNode>(tables.nodes, std::identity()),
             pieces_of<TriangleBlock>(tables.wide, [](Wide w) { return w->arrays().blocks.view(); }),
             pieces_of<CompactNode>(tables.wide,
                                    [](Wide w) { return w->arrays().compact_nodes.view(); }),

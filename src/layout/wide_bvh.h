@@ -96,6 +96,8 @@ struct WideBvh::Arrays {
     struct Frame {
         alignas(16) float lo[4]{}, hi[4]{}, middle[4]{};
     } frame;
+    // Rays widen the boxes of a node by its own size (local_pads.h), not by the root's.
+    bool local_pads = false;
     WideBvhStats stats;
     mutable PathRates rates;  // of batches so far
 
@@ -121,6 +123,7 @@ struct WideBvh::Arrays {
         vertices.reset(0);
         bounds = {};
         frame = {};
+        local_pads = false;
         stats = {};
         stats.width = options.width;
         stats.compact = options.compact;

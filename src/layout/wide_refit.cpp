@@ -15,6 +15,7 @@
 #include "exec/parallel.h"
 #include "layout/about_middle.h"
 #include "layout/leaf_order.h"
+#include "layout/local_pads.h"
 #include "primitives/bounds.h"
 #include "primitives/sources.h"
 #include "primitives/zero_area.h"
@@ -191,6 +192,7 @@ public:
             fit(center_of(bounds));
         }
         out_.set_bounds(bounds);
+        settle_local_pads(out_);
         out_.stats.left_out = left_out_;
         out_.stats.sah = sah(half_area(bounds));
         return true;

@@ -103,7 +103,7 @@ TEST(MovingMesh, RandomSequencesOfChangesAnswerAsNewScenes) {
 TEST(MovingMesh, ManyMeshesOfAllSizesAreTheSameForEveryNumberOfThreads) {
     test::Random random(8);
     std::vector<Mesh> meshes;
-    for (std::uint32_t k = 0; k < 60; ++k) {
+    for (std::uint32_t k = 0; k < 80; ++k) {
         Mesh mesh = k % 20 == 7 ? figure(5000) : test::random_soup(k % 5 == 1 ? 700 : 12, k, 0.5f);
         const Vec3 at = random.in(-3, 3);
         for (Vec3& v : mesh.vertices) v = v + at;
@@ -129,9 +129,9 @@ TEST(MovingMesh, ManyMeshesOfAllSizesAreTheSameForEveryNumberOfThreads) {
         reports.push_back(scene.commit(options));
         hits.push_back(trace(scene, rays));
     }
-    EXPECT_EQ(reports[0].trees_built, 60u);
+    EXPECT_EQ(reports[0].trees_built, 80u);
     EXPECT_EQ(reports[0].left_out, 1u);
-    EXPECT_EQ(reports[1].trees_built + reports[1].trees_refitted, 30u);
+    EXPECT_EQ(reports[1].trees_built + reports[1].trees_refitted, 40u);
     EXPECT_GT(reports[1].trees_built, 0u);
     EXPECT_GT(reports[1].trees_refitted, 10u);
     for (std::size_t k = 2; k < hits.size(); ++k) {

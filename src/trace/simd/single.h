@@ -63,7 +63,10 @@ public:
     WideBest trace(std::uint32_t root, const WideBest& best) {
         best_ = best;
         if (!(frame_.tmin <= best_.t)) return best_;
-        const Rates rates = plain_rates();
+        if constexpr (may_have_local_pads)
+            if (tree_.local_pads) [[unlikely]]
+                return trace_with_local_pads(root);
+        const Rates rates = plain_rates(frame_.near, frame_.far);
         std::uint32_t word = root;
         std::size_t top = 0;
         while (step(rates, top, word)) {
@@ -99,28 +102,62 @@ protected:
     struct Rates {
         V rate[3], near[3], far[3];
     };
-    HWY_INLINE Rates plain_rates() const {
+    HWY_INLINE Rates plain_rates(const float* near, const float* far) const {
         Rates out;
         for (int axis = 0; axis < 3; ++axis) {
             out.rate[axis] = hn::Set(f8, frame_.inverse[axis]);
-            out.near[axis] = hn::Set(f8, frame_.near[axis]);
-            out.far[axis] = hn::Set(f8, frame_.far[axis]);
+            out.near[axis] = hn::Set(f8, near[axis]);
+            out.far[axis] = hn::Set(f8, far[axis]);
         }
         return out;
     }
+    /// Compact nodes say where they are: their own rates see to it.
+    static constexpr bool may_have_local_pads = !compact && std::is_same_v<Parts, NoParts>;
+
+    HWY_NOINLINE WideBest trace_with_local_pads(std::uint32_t word) {
+        std::size_t top = 0;
+        for (;;) {
+            if ((word & wide_leaf_bit) == 0) {
+                const auto& node = tree_.template node<false>(word);
+                float near[3], far[3];
+                set_local_starts(tree_, node, frame_, near, far);
+                if (visit(node, plain_rates(near, far), top, word)) continue;
+            } else if (test_leaf(word)) {
+                return best_;
+            }
+            if (!pop(top, word)) return best_;
+        }
+    }
     HWY_INLINE Rates rates_of(const CompactNode& node, const Rates&) const {
         Rates out;
+        float step[3], from[3], local[3];
         for (int axis = 0; axis < 3; ++axis) {
             const std::uint32_t bits = std::uint32_t{node.exponent[axis]} << 23;
-            float step;
-            std::memcpy(&step, &bits, sizeof(step));
-            const float from = node.origin[axis] - frame_.origin[axis], pad = frame_.near_pad[axis],
-                        inverse = frame_.inverse[axis];
-            out.rate[axis] = hn::Set(f8, step * inverse);
-            out.near[axis] = hn::Set(f8, (from + pad) * inverse);
-            out.far[axis] = hn::Set(f8, (from - pad) * inverse);
+            std::memcpy(step + axis, &bits, sizeof(float));
+            from[axis] = node.origin[axis] - frame_.origin[axis];
+        }
+        const float* pads = frame_.near_pad;
+        if (tree_.local_pads) [[unlikely]] {
+            set_local_pads(from, step, local);
+            pads = local;
+        }
+        for (int axis = 0; axis < 3; ++axis) {
+            const float inverse = frame_.inverse[axis];
+            out.rate[axis] = hn::Set(f8, step[axis] * inverse);
+            out.near[axis] = hn::Set(f8, (from[axis] + pads[axis]) * inverse);
+            out.far[axis] = hn::Set(f8, (from[axis] - pads[axis]) * inverse);
         }
         return out;
+    }
+    /// As set_local_starts, of a compact node that begins `from` away from the ray's start.
+    HWY_NOINLINE void set_local_pads(const float* from, const float* step, float* pads) const {
+        float reach[3];
+        for (int axis = 0; axis < 3; ++axis)
+            reach[axis] = std::fabs(from[axis]) + 256.0f * step[axis];
+        for (int axis = 0; axis < 3; ++axis)
+            pads[axis] = std::copysign(
+                wide_pad_factor * slab_pad * (reach[axis] + reach[frame_.kind.kz]) + least_slab_pad,
+                frame_.near_pad[axis]);
     }
     HWY_INLINE const Rates& rates_of(const WideNode&, const Rates& rates) const { return rates; }
     static HWY_INLINE V planes(const float* from) { return hn::Load(f8, from); }

@@ -93,6 +93,8 @@ struct Plan {
           counted(options.counters),
           few(rays.size() < 32) {
         if (automatic) look = look_at(tree.arrays().bounds, rays);
+        // Rays together share one pad.
+        if (automatic && tree.arrays().local_pads) look.path = SimdPath::single;
         look.kind.any = any;
     }
 
@@ -127,6 +129,13 @@ struct Plan {
         const bool tiny = learns && streams && look.kind.size == 0;
         if (small && first == PathWay::streams) first = PathWay::turns;
         JobWays ways;
+        if (automatic && tree.arrays().local_pads) {
+            ways.add(PathWay::turns);
+            if (!learns || !streams) return ways;
+            ways.add(PathWay::alone);
+            ways.rates = &tree.arrays().rates.ways(look.kind);
+            return ways;
+        }
         if (tiny && few && first != PathWay::packets) {
             ways.add(PathWay::alone);
             return ways;
@@ -294,7 +303,7 @@ HitRows rows_of(std::span<Hit> hits) { return {hits.data(), 0}; }
 /// Largest jobs, one after the other, in the caller's floating-point environment.
 void trace_on_this_thread(const WideBvh& tree, std::span<const Ray> rays, HitRows hits,
                           std::uint8_t* occluded) {
-    PathWay way = way_of(choose_simd_path(tree, rays));
+    PathWay way = tree.arrays().local_pads ? PathWay::turns : way_of(choose_simd_path(tree, rays));
     if (way == PathWay::streams && BatchKind::size_of(rays.size()) < least_size_to_stream)
         way = PathWay::turns;
     const Batch batch{tree, simd_kernels().front(), rays, hits, occluded, false};

@@ -37,9 +37,9 @@ class TurnRay : SingleRay<wanted, counting, compact, false, Parts> {
 
 public:
     /// As SingleRay's; children go to `stack.pairs`. The frame may change until begin().
-    TurnRay(const WideView& tree, const SingleFrame& frame, const WideStackView& stack,
+    TurnRay(const WideView& tree, SingleFrame& frame, const WideStackView& stack,
             SimdCounts& counts, Parts* parts = nullptr)
-        : Base(tree, frame, stack, counts, parts) {
+        : Base(tree, frame, stack, counts, parts), starts_(frame) {
         if constexpr (compact)
             nodes_ = address(tree.compact_nodes), blocks_ = address(tree.compact_blocks);
         else
@@ -57,7 +57,8 @@ public:
         const SingleFrame& frame = this->frame_;
         this->at_ = &plane_places[frame.kind.negatives];
         planes_ = packed_plane_places[frame.kind.negatives] |
-                  static_cast<std::uint64_t>(frame.careful) << careful_bit;
+                  static_cast<std::uint64_t>(frame.careful) << careful_bit |
+                  static_cast<std::uint64_t>(this->tree_.local_pads) << local_bit;
         tmin_ = frame.tmin;
         best_ = {tmax};
         *stack_.pairs = the_end;
@@ -129,12 +130,13 @@ public:
 
 private:
     using Base::best_;
+    using Base::frame_;
     using Base::stack_;
 
     /// Below all children: no node or leaf.
     static constexpr std::uint64_t the_end = wide_no_child;
     static_assert(std::endian::native == std::endian::little);  // pairs are written as two floats
-    static constexpr int careful_bit = 56;
+    static constexpr int careful_bit = 56, local_bit = 57;
 
     static std::uintptr_t address(const void* p) { return reinterpret_cast<std::uintptr_t>(p); }
 
@@ -143,6 +145,9 @@ private:
     HWY_INLINE void look_at_node() {
         if constexpr (counting) ++this->counts_.visits;
         const Node& node = *reinterpret_cast<const Node*>(next_address_);
+        if constexpr (Base::may_have_local_pads)
+            if (planes_ >> local_bit != 0) [[unlikely]]
+                set_local_starts(this->tree_, node, starts_, starts_.near, starts_.far);
         pushed_ = 0;
         for (std::size_t l = 0; l < 8; l += lanes8) push_met(node, l);
     }
@@ -191,7 +196,7 @@ private:
     /// Where a ray enters children l to l + lanes8 - 1, and where it leaves or need not look.
     HWY_INLINE void test_boxes(const Node& node, std::size_t l, V& entry, V& exit) const {
         if constexpr (compact) {
-            const auto about = this->plain_rates();
+            const auto about = this->plain_rates(frame_.near, frame_.far);
             Base::test_boxes(node, this->rates_of(node, about), l, entry, exit);
             return;
         }
@@ -296,8 +301,9 @@ private:
         pairs[k] = pair;
     }
 
+    SingleFrame& starts_;  // the frame, for trees whose nodes have pads of their own
     float tmin_ = 0;
-    std::uint64_t planes_ = 0;  // packed_plane_places; from careful_bit on SingleFrame::careful
+    std::uint64_t planes_ = 0;  // packed_plane_places, and whether visits are special
     std::uintptr_t nodes_, blocks_;
     std::uintptr_t next_address_ = 0;
     std::uint64_t* top_ = nullptr;

@@ -68,6 +68,7 @@ struct WideView {
     // By axis, the last is 0: the root's bounds, and their middle, which planes of WideNode are
     // about.
     const float *lo, *hi, *middle;
+    bool local_pads;  // as the tree says
 
     template <bool compact>
     [[nodiscard]] const auto& node(std::uint32_t word) const {
@@ -97,7 +98,7 @@ inline WideView view_of(const WideBvh::Arrays& arrays, TriangleBlock* room = nul
     return {arrays.nodes.data(),          arrays.blocks.data(),   arrays.compact_nodes.data(),
             arrays.compact_blocks.data(), arrays.vertices.data(), room,
             arrays.stats.compact,         arrays.frame.lo,        arrays.frame.hi,
-            arrays.frame.middle};
+            arrays.frame.middle,          arrays.local_pads};
 }
 
 /// Children still to visit: words of WideNode::child and where the ray enters them. Rays in turn
