@@ -245,6 +245,21 @@ Mesh make_far_small(Random& random, std::uint32_t count) {
     return mesh;
 }
 
+Mesh make_strays(Random& random, std::uint32_t count) {
+    const auto family = static_cast<Family>(random.below(std::size_t(Family::tiny_and_huge)));
+    Mesh mesh = make_mesh(random, family, count).mesh;
+    const float far = random.power_of_ten(2, 11);
+    for (std::size_t more = 1 + random.below(4); more > 0; --more) {
+        if (random.chance(0.5)) {
+            add_small(random, mesh, away(random, {0, 0, 0}, far), far * random.power_of_ten(-3, 0));
+        } else {
+            const Vec3 a = away(random, {0, 0, 0}, far), b = away(random, {0, 0, 0}, far);
+            add_triangle(mesh, a, b, away(random, {0, 0, 0}, 1));
+        }
+    }
+    return mesh;
+}
+
 using MakeFamily = Mesh (*)(Random&, std::uint32_t);
 struct FamilyEntry {
     const char* name;
@@ -270,6 +285,7 @@ constexpr std::array<FamilyEntry, std::size_t(Family::count)> families{{
     {"stretched_sphere", make_stretched_sphere},
     {"tetrahedra", make_tetrahedra},
     {"far_small", make_far_small},
+    {"strays", make_strays},
 }};
 
 /// One axis 1 to 10^7 times as long, or down to subnormal numbers; or all axes scaled alike.

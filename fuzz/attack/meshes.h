@@ -27,6 +27,7 @@ enum class Family : std::uint32_t {
     stretched_sphere,  // closed, one axis up to 10^7 times as long
     tetrahedra,        // closed, small whole numbers
     far_small,         // triangles of size 1 near 1e6
+    strays,            // a small thing, and a few corners far from it
     count
 };
 const char* family_name(Family family);

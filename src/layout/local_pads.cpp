@@ -17,7 +17,7 @@ namespace {
 /// side: 10 roundings for each of two axes (trace/simd/wide_ray.h).
 constexpr float pad_a_side = 20 * 0x1p-24f;
 /// From so many times the area on, most visits of boxes are for nothing.
-constexpr double much_larger = 8;
+constexpr double much_larger = 32;
 constexpr std::size_t nodes_to_look_at = 256;
 
 bool is_leaf(std::uint32_t word) { return word != wide_no_child && (word & wide_leaf_bit) != 0; }
