@@ -45,6 +45,7 @@ std::vector<Ray> rays_about(Vec3 center, float far, std::size_t count) {
         if (i % 3 == 0) ray.direction = random.in(-1, 1);
         if (i % 11 == 0) ray.direction = ray.direction * 1e-6f;
         if (i % 5 == 0) ray.tmax = 0.7f;
+        if (i % 29 == 0) ray.origin = random.in(-1, 1) * 2e38f;  // sums of such overflow
         rays.push_back(ray);
     }
     return rays;

@@ -151,13 +151,13 @@ protected:
     }
     /// As set_local_starts, of a compact node that begins `from` away from the ray's start.
     HWY_NOINLINE void set_local_pads(const float* from, const float* step, float* pads) const {
-        float reach[3];
+        constexpr float rate = wide_pad_factor * slab_pad;
+        float share[3];
         for (int axis = 0; axis < 3; ++axis)
-            reach[axis] = std::fabs(from[axis]) + 256.0f * step[axis];
+            share[axis] = rate * std::fabs(from[axis]) + rate * (256.0f * step[axis]);
+        const float along = share[frame_.kind.kz] + least_slab_pad;
         for (int axis = 0; axis < 3; ++axis)
-            pads[axis] = std::copysign(
-                wide_pad_factor * slab_pad * (reach[axis] + reach[frame_.kind.kz]) + least_slab_pad,
-                frame_.near_pad[axis]);
+            pads[axis] = std::copysign(share[axis] + along, frame_.near_pad[axis]);
     }
     HWY_INLINE const Rates& rates_of(const WideNode&, const Rates& rates) const { return rates; }
     static HWY_INLINE V planes(const float* from) { return hn::Load(f8, from); }

@@ -52,14 +52,16 @@ HWY_INLINE void set_starts(const WideView& tree, V4 origin, V4 inverse, V4 near_
     hn::Store(near, f4, out.near);
     hn::Store(far, f4, out.far);
     const V4 most = hn::Set(f4, std::numeric_limits<float>::max());
-    out.careful = (bits_of(f4, hn::Le(hn::Add(hn::Abs(near), hn::Abs(far)), most)) & 7) != 7;
+    out.careful = tree.local_pads ||
+                  (bits_of(f4, hn::Le(hn::Add(hn::Abs(near), hn::Abs(far)), most)) & 7) != 7;
 }
 
 /// Where planes of one node start that widen by what the node's triangles are away from the ray's
 /// start and from the tree's middle, not by all of the tree (docs/algorithms/wide.md).
 inline HWY_NOINLINE void set_local_starts(const WideView& tree, const WideNode& node,
                                           const SingleFrame& ray, float* near, float* far) {
-    float from[3], reach[3];
+    constexpr float rate = wide_pad_factor * slab_pad;
+    float from[3], share[3];  // of the pads; rays may start so far off that sums overflow
     for (std::size_t axis = 0; axis < 3; ++axis) {
         auto lo = hn::Load(f8, node.lo[axis]), hi = hn::Load(f8, node.hi[axis]);
         for (std::size_t l = lanes8; l < 8; l += lanes8) {
@@ -69,13 +71,12 @@ inline HWY_NOINLINE void set_local_starts(const WideView& tree, const WideNode& 
         from[axis] = tree.middle[axis] - ray.origin[axis];
         const float first = hn::GetLane(hn::MinOfLanes(f8, lo)) + from[axis],
                     last = hn::GetLane(hn::MaxOfLanes(f8, hi)) + from[axis];
-        reach[axis] = max_of(std::fabs(first), std::fabs(last)) + std::fabs(from[axis]);
+        share[axis] =
+            rate * max_of(std::fabs(first), std::fabs(last)) + rate * std::fabs(from[axis]);
     }
-    const float along = reach[ray.kind.kz];
+    const float along = share[ray.kind.kz] + least_slab_pad;
     for (std::size_t axis = 0; axis < 3; ++axis) {
-        const float pad =
-            std::copysign(wide_pad_factor * slab_pad * (reach[axis] + along) + least_slab_pad,
-                          ray.near_pad[axis]);
+        const float pad = std::copysign(share[axis] + along, ray.near_pad[axis]);
         near[axis] = (from[axis] + pad) * ray.inverse[axis];
         far[axis] = (from[axis] - pad) * ray.inverse[axis];
     }
