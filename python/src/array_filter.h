@@ -1,7 +1,8 @@
 // Which hits count, by arrays: what each ray leaves out, and which primitives rays see at all.
 #pragma once
 
-#include <raydix/types.h>
+#include <raydix/double.h>
+#include <raydix/scene.h>
 
 #include <cstddef>
 #include <cstdint>
@@ -28,5 +29,12 @@ struct ArrayFilter {
         return found == seen.end() || found->second[hit.prim];
     }
 };
+
+/// Throws InputError for an array of `seen` that has another length than its geometry has
+/// primitives by the scene's last commit. Geometries that the scene does not have are passed over.
+template <class Scalar>
+void require_lengths(const ArrayFilter& filter, const BasicScene<Scalar>& scene);
+extern template void require_lengths(const ArrayFilter&, const Scene&);
+extern template void require_lengths(const ArrayFilter&, const SceneD&);
 
 }  // namespace raydix::python

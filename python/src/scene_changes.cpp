@@ -22,6 +22,7 @@
 #include <vector>
 
 #include "arrays.h"
+#include "asking.h"
 #include "batch.h"
 #include "bindings.h"
 #include "figures.h"
@@ -34,8 +35,6 @@ template <class Scene>
 using TransformRows = In<typename Scene::Types::Scalar, nb::shape<-1, 12>>;
 static_assert(sizeof(Transform) == 12 * sizeof(float));
 static_assert(sizeof(TransformD) == 12 * sizeof(double));
-template <class Scene>
-using PointRows = In<typename Scene::Types::Scalar, nb::shape<-1, 3>>;
 
 BuildOptions build_options(const std::string& builder, int reinsertion_rounds, int bits,
                            int max_leaf, bool strict, int threads) {
@@ -406,9 +405,6 @@ template void bind_changes(nb::class_<SceneTrees>& scene);
 template void bind_changes(nb::class_<SceneTreesD>& scene);
 
 namespace {
-
-template <class Scene>
-using Scalar = typename Scene::Types::Scalar;
 
 /// Rows of numbers that are one shape each.
 template <class Shape, class Scene>

@@ -2,7 +2,6 @@
 #include "scene_trees.h"
 
 #include <raydix/error.h>
-#include <raydix/surface.h>
 
 #include <algorithm>
 #include <limits>
@@ -22,41 +21,23 @@ std::mutex& structure() {
 
 namespace {
 
+/// Throws InputError, with the first rays of a call, as require_lengths does.
 template <class Scalar>
-BasicSceneTraceOptions<Scalar> trace_options(const RayOptions& options) {
+BasicSceneTraceOptions<Scalar> trace_options(const BasicScene<Scalar>& scene,
+                                             const RayOptions& options) {
     BasicSceneTraceOptions<Scalar> out;
     out.mask = options.mask;
     out.masks = options.masks;
     out.threads = options.threads;
     out.max_result_bytes = options.max_result_bytes;
     if (options.filter != nullptr) {
+        if (options.first == 0) require_lengths(*options.filter, scene);
         out.filter = [filter = options.filter, first = options.first](
                          std::size_t place, const auto&, const auto& hit) {
             return filter->takes(first + place, hit);
         };
     }
     return out;
-}
-
-/// Of the last commit.
-template <class Scalar>
-bool has_primitive(const BasicScene<Scalar>& scene, std::uint32_t instance, std::uint32_t geometry,
-                   std::uint64_t prim) {
-    if (prim >= no_primitive) return false;
-    BasicHit<Scalar> hit;
-    hit.t = 0;
-    hit.prim = static_cast<std::uint32_t>(prim);
-    hit.geometry = geometry;
-    hit.instance = instance;
-    const BasicRay<Scalar> ray{};
-    BasicVec3<Scalar> point{};
-    try {
-        positions(scene, std::span(&ray, 1), std::span<const BasicHit<Scalar>>(&hit, 1),
-                  std::span(&point, 1), 1);
-        return true;
-    } catch (const InputError&) {
-        return false;
-    }
 }
 
 std::string name_of(std::uint32_t id) { return "geometry " + std::to_string(id); }
@@ -567,46 +548,22 @@ std::shared_ptr<const typename Names::Solid> BasicSceneTrees<Names>::solid(Insid
 }
 
 template <class Names>
-void BasicSceneTrees<Names>::check_filter(const RayOptions& options) {
-    if (options.filter == nullptr || options.first != 0) return;
-    for (const auto& [place, values] : options.filter->seen) {
-        const auto holds = [&, &path = place.first, &id = place.second](std::uint64_t prim) {
-            return has_primitive(traced(), path, id, prim);
-        };
-        if (!holds(0) || (!holds(values.size()) && (values.empty() || holds(values.size() - 1))))
-            continue;
-        std::uint64_t some = 0, all = no_primitive;
-        while (all - some > 1) {
-            const std::uint64_t middle = some + (all - some) / 2;
-            (holds(middle) ? some : all) = middle;
-        }
-        throw InputError("keep: geometry " + std::to_string(place.second) + " has " +
-                         std::to_string(all) + " primitives, but its array has " +
-                         std::to_string(values.size()) + " values");
-    }
-}
-
-template <class Names>
 TraceCounts BasicSceneTrees<Names>::trace(std::span<const Ray> rays, std::span<Hit> hits,
                                           const RayOptions& options) {
-    check_filter(options);
-    return raydix::trace(traced(), rays, hits, trace_options<typename Names::Scalar>(options));
+    return raydix::trace(traced(), rays, hits, trace_options(traced(), options));
 }
 
 template <class Names>
 TraceCounts BasicSceneTrees<Names>::trace_any(std::span<const Ray> rays,
                                               std::span<std::uint8_t> occluded,
                                               const RayOptions& options) {
-    check_filter(options);
-    return raydix::trace_any(traced(), rays, occluded,
-                             trace_options<typename Names::Scalar>(options));
+    return raydix::trace_any(traced(), rays, occluded, trace_options(traced(), options));
 }
 
 template <class Names>
 typename Names::AllHits BasicSceneTrees<Names>::trace_all(std::span<const Ray> rays,
                                                           const RayOptions& options) {
-    check_filter(options);
-    return raydix::trace_all(traced(), rays, trace_options<typename Names::Scalar>(options));
+    return raydix::trace_all(traced(), rays, trace_options(traced(), options));
 }
 
 template <class Names>

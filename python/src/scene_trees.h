@@ -299,9 +299,6 @@ private:
         bool is_in_file = false;  // the arrays of the mesh are those that the scene came with
     };
 
-    /// Throws InputError for an array of the call's filter that has another length than its
-    /// geometry has primitives. Geometries that the last commit does not have are passed over.
-    void check_filter(const RayOptions& options);
     void check_strict(const std::string& name, const typename Names::MeshView& mesh) const;
     void check_places(std::span<const std::uint32_t> ids, std::span<const Transform> transforms);
     static void check_transforms(std::span<const Transform> transforms);
