@@ -25,9 +25,12 @@ struct Picture {
 /// `path`, white in `ao`, and black in `normal`, `depth` and `primitive`.
 /// - `shaded`: grey surfaces under sky and sun with shadows; in closed rooms under a lamp at the
 ///   camera.
-/// - `normal`: (n + 1) / 2 of the geometric normal, turned to the viewer.
+/// - `normal`: (n + 1) / 2 of the geometric normal, turned to the viewer. Spheres, capsules and
+///   points have the normals of raydix/surface.h. User geometry has none that is known: in all
+///   views its normal points against the ray.
 /// - `depth`: distance along the view, from 1 at the nearest hit down to 1/10 at the farthest.
-/// - `primitive`: a colour for each triangle, and of a scene for each instance that shows it.
+/// - `primitive`: a colour for each triangle or shape, and of a scene for each instance that shows
+/// it.
 /// - `ao`: the part of the sky that is open within ao_radius.
 /// - `diffuse`: as `shaded`, with one bounce of light in place of the even sky.
 /// - `steps`: the number of nodes that a ray visits, as a heat map. For a scene: of a ray that goes

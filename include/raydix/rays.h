@@ -54,9 +54,9 @@ struct SecondaryOptions {
                                                    std::span<const std::uint32_t> pixels,
                                                    const SecondaryOptions& options);
 /// The same from hits of a scene, as its last commit left it. A scene of one mesh gives the same
-/// rays as its tree. Normals are those of raydix/surface.h, turned toward the ray. Throws
-/// InputError also if the scene was never committed, or does not have the path or the mesh of a
-/// hit.
+/// rays as its tree. Normals are those of raydix/surface.h, turned toward the ray: those of
+/// spheres, capsules and points too. Throws InputError also if the scene was never committed, does
+/// not have the path or the geometry of a hit, or knows no normal there, as of user geometry.
 [[nodiscard]] std::vector<Ray> make_secondary_rays(const Scene& scene, std::span<const Ray> rays,
                                                    std::span<const Hit> hits,
                                                    std::span<const std::uint32_t> pixels,

@@ -4,20 +4,11 @@ arrays out."""
 from __future__ import annotations
 
 from ._arrays import MISSING
-from ._core import (
-    BackendUnavailable,
-    DeviceError,
-    InputError,
-    __version__,
-    builders,
-    kernels,
-    machine,
-    machines,
-    scenes,
-)
+from ._core import BackendUnavailable, DeviceError, InputError, __version__
 from .cameras import Camera
 from .devices import Device, devices
 from .hits import Hits
+from .names import builders, kernels, machine, machines, scenes
 from .pictures import save_picture, to_png, to_srgb
 from .points import Points, load_points
 from .scene import Scene, load_scene

@@ -29,9 +29,12 @@ _READABLE_DEVICES = (1, 3, 13)
 def to_numpy(value: Any, name: str) -> np.ndarray:
     """`value` as NumPy has it: itself, a view of another library's array (DLPack), or a new array.
 
-    TypeError if it is no array of numbers or its memory is a device's.
+    TypeError if it is no array of numbers or its memory is a device's. InputError if values of it
+    are masked.
     """
     if isinstance(value, np.ndarray):
+        if np.ma.is_masked(value):
+            raise InputError(f"{name}: expected no masked values, given {int(value.mask.sum())}")
         # Columns of np.matrix keep two dimensions: what is not a plain array is seen as one.
         return value if type(value) is np.ndarray else value.view(np.ndarray)
     if hasattr(value, "__dlpack__") and hasattr(value, "__dlpack_device__"):
@@ -168,6 +171,11 @@ def path(value: Any, name: str) -> bytes:
         raise TypeError(f"{name}: expected a path, given {shown(value)}") from None
 
 
+def own_attributes(thing: Any, made: tuple[str, ...]) -> dict[str, Any] | None:
+    """What an object carries besides the attributes that its class made; None: nothing."""
+    return {name: own for name, own in vars(thing).items() if name not in made} or None
+
+
 def result_bytes(value: Any) -> int:
     return whole(value, "max_result_bytes", 0, 2**64 - 1)
 
@@ -182,7 +190,7 @@ def whole(value: Any, name: str, least: int, most: int) -> int:
     except TypeError:
         if not isinstance(value, (float, np.floating)):
             error = TypeError
-        elif value == np.floor(value) and least <= value <= most:  # neither NaN nor infinite
+        elif np.isfinite(value) and value == np.floor(value) and least <= int(value) <= most:
             return int(value)
     raise error(f"{name}: expected a whole number, {least} to {most}, given {shown(value)}")
 

@@ -135,8 +135,12 @@ def ray_rows(
     if len(args) == 1:
         return args[0]
     made = np.zeros((len(args[0]), 8), dtype)
-    made[:, :3], made[:, 4:7], made[:, 7] = args[0], args[1], np.inf
+    with np.errstate(over="ignore"):  # beyond float32 it is infinite
+        made[:, :3], made[:, 4:7], made[:, 7] = args[0], args[1], np.inf
     return made
+
+
+_expected_hits = f"hits: expected a dict of arrays {', '.join(COLUMNS)}, as of Scene.intersect"
 
 
 def hit_rows(hits: Any, dtype: np.dtype, columns: int) -> np.ndarray:
@@ -145,11 +149,14 @@ def hit_rows(hits: Any, dtype: np.dtype, columns: int) -> np.ndarray:
         return np.ascontiguousarray(hits._rows)
     try:
         given = {name: np.asarray(hits[name]) for name in COLUMNS}
+    except (KeyError, IndexError, TypeError, ValueError):
+        raise TypeError(_expected_hits) from None
+    for name in ("prim", "geometry", "instance"):
+        given[name] = uint32s(given[name], f"hits, {name}")
+    try:
         rows = np.zeros((*given["t"].shape, columns), dtype)
         for name, column in Hits(rows).items():
             column[...] = given[name]
-    except (KeyError, IndexError, TypeError, ValueError):
-        raise TypeError(
-            f"hits: expected a dict of arrays {', '.join(COLUMNS)}, as of Scene.intersect"
-        ) from None
+    except (TypeError, ValueError):
+        raise TypeError(_expected_hits) from None
     return rows

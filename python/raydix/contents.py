@@ -207,7 +207,8 @@ class SceneContents:
         `radii` of shape (N,), or one number for all. Rays hit them from both sides; one that
         starts inside hits where it leaves.
 
-        Spheres that are not finite, have a negative radius or reach beyond 1e12 are left out.
+        Spheres that are not finite, have a negative radius or reach beyond 1e12 are left out; of a
+        strict scene `commit` refuses them.
         Copied, in the scene's type. `mask`, `id` and the result as in `add`.
         """
         made = self._spheres(centers, radii)

@@ -122,7 +122,8 @@ class SceneViews:
         "diffuse_shuffled".
 
         Halton points, cosine-weighted about the normal (Aila, Laine 2009), sorted by origin and
-        direction. Rays that miss have none. Those of a scene in float64 have directions of float32
+        direction. Rays that miss have none. Spheres, capsules and points have the normals that
+        `normals` gives. Those of a scene in float64 have directions of float32
         numbers, and origins with an error of 2**-24 of the diagonal of the scene's box at most: a
         fiftieth of the distance that they keep from the surface.
         """
@@ -191,6 +192,14 @@ def _picture(value: ArrayLike) -> np.ndarray:
     return cast(picture, FLOAT32)
 
 
+def _of_pixels(value: ArrayLike) -> np.ndarray:
+    """A picture that a file can hold."""
+    picture = _picture(value)
+    if picture.size == 0:
+        raise _core.InputError(f"picture: expected at least one pixel, given {describe(picture)}")
+    return picture
+
+
 def to_srgb(picture: ArrayLike) -> np.ndarray:
     """Linear colours (H, W, 3) -> 8-bit sRGB of the same shape (uint8), clamped to [0, 1], without
     a tone curve."""
@@ -202,10 +211,10 @@ def to_srgb(picture: ArrayLike) -> np.ndarray:
 def to_png(picture: ArrayLike, *, tone_map: bool = True) -> bytes:
     """Linear colours (H, W, 3) -> the bytes of a PNG file, 8-bit sRGB; `tone_map`: after a filmic
     curve."""
-    return _core.png(_picture(picture), flag(tone_map, "tone_map"))
+    return _core.png(_of_pixels(picture), flag(tone_map, "tone_map"))
 
 
 def save_picture(file: str | bytes | os.PathLike, picture: ArrayLike, *, tone_map: bool = True) -> None:
     """Writes linear colours (H, W, 3) as .png (8-bit sRGB) or .exr (float). InputError names the
     file."""
-    _core.save_picture(path(file, "file"), _picture(picture), flag(tone_map, "tone_map"))
+    _core.save_picture(path(file, "file"), _of_pixels(picture), flag(tone_map, "tone_map"))

@@ -18,6 +18,7 @@ from ._arrays import (
     floats,
     number,
     one_of,
+    own_attributes,
     path,
     result_bytes,
     rows,
@@ -95,9 +96,9 @@ class Points:
         return points
 
     def __reduce__(self) -> tuple:
-        """Pickles, copies and deep copies are the points; their trees are built again. Removed
-        points keep their numbers."""
-        return _remade, (self._points(), self._options)
+        """Pickles, copies and deep copies are the points and what else the object carries; their
+        trees are built again. Removed points keep their numbers."""
+        return _remade, (self._points(), self._options, type(self)), own_attributes(self, _OWN)
 
     def add(self, points: ArrayLike) -> np.ndarray:
         """Adds points, shape (M, D) or (D,), in the type of the index. Returns their numbers, (M,)
@@ -281,13 +282,19 @@ class Points:
         return f"<raydix.Points: {len(self):,} points, {self.dimension}-D {self.dtype}>"
 
 
-def _remade(points: np.ndarray, options: dict[str, Any]) -> Points:
+_OWN = ("dtype", "dimension", "threads", "_core", "_options")
+"""What an index makes for itself."""
+
+
+def _remade(points: np.ndarray, options: dict[str, Any], kind: type[Points] = Points) -> Points:
+    index = object.__new__(kind)
     if not options["strict"]:
-        return Points(points, **options)
+        Points.__init__(index, points, **options)
+        return index
     removed = np.flatnonzero(np.isnan(points).any(axis=1))
     points[removed] = 0
-    index = Points(points, **options)
-    index.remove(removed)
+    Points.__init__(index, points, **options)
+    Points.remove(index, removed)
     return index
 
 

@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ._arrays import (
+    ALL,
     FLOAT32,
     FLOAT64,
     UINT32,
+    cast,
     flag,
     number,
     one_of,
@@ -18,6 +20,7 @@ from ._arrays import (
     result_bytes,
     rows,
     shown,
+    whole,
 )
 from ._rays import floats_of, ray_batch
 
@@ -36,7 +39,7 @@ class SceneQueries:
     threads: int
 
     def closest_point(
-        self, points: ArrayLike, *, max_distance: float = np.inf
+        self, points: ArrayLike, *, max_distance: float = np.inf, mask: int = ALL
     ) -> dict[str, np.ndarray]:
         """The point of the scene that is closest to each query.
 
@@ -44,7 +47,8 @@ class SceneQueries:
         decides, rounded) nothing is found. Returns a dict of arrays with the leading shape of the
         queries: "point" (..., 3), "distance", "u" and "v" in the scene's type; "prim", "geometry"
         and "instance" as those of a hit. At equal distances the lower (instance, geometry, prim)
-        wins; nothing found: infinity and 0xFFFFFFFF. ValueError for a negative or NaN
+        wins; nothing found: infinity and 0xFFFFFFFF. `mask` as in `intersect`: geometries and
+        instances that it does not show are not there. ValueError for a negative or NaN
         `max_distance`.
 
         Triangles of instances are those that their vertices make in the world, moved in float64 and
@@ -54,7 +58,7 @@ class SceneQueries:
         reach = number(max_distance, "max_distance")
         # prim, geometry and instance are uint32 behind the distance, padded to whole scalars.
         places = np.empty((len(asked), 9 if self.dtype == FLOAT32 else 8), self.dtype)
-        self._core.closest(asked, places, reach, self.threads)
+        self._core.closest(asked, places, reach, self.threads, _mask(mask))
         places = places.reshape(lead + (places.shape[1],))
         first = self.dtype.itemsize
         ids = places.view(UINT32)[..., first : first + 3]
@@ -69,36 +73,47 @@ class SceneQueries:
         }
 
     def signed_distance(
-        self, points: ArrayLike, *, max_distance: float = np.inf, rule: str = "automatic"
+        self,
+        points: ArrayLike,
+        *,
+        max_distance: float = np.inf,
+        rule: str = "automatic",
+        mask: int = ALL,
     ) -> np.ndarray:
         """Distance of each point from the mesh, negative inside: in the scene's type, with the
         leading shape of the queries.
 
         (`trimesh.proximity.signed_distance` has the other sign.) The sign is that of `contains`
-        with this `rule`. Beyond `max_distance` the answer is infinite, with its sign; for points
+        with this `rule` and `mask`. Beyond `max_distance` the answer is infinite, with its sign; for points
         with NaN or infinity it is infinite.
         """
         asked, lead = rows(points, "points", (3,), self.dtype)
         distances = np.empty(lead, self.dtype)
         reach = number(max_distance, "max_distance")
-        self._core.signed_distance(asked, distances.reshape(-1), reach, _rule(rule), self.threads)
+        how = (_rule(rule), self.threads, _mask(mask))
+        self._core.signed_distance(asked, distances.reshape(-1), reach, *how)
         return distances
 
-    def contains(self, points: ArrayLike, *, rule: str = "automatic") -> np.ndarray:
+    def contains(
+        self, points: ArrayLike, *, rule: str = "automatic", mask: int = ALL
+    ) -> np.ndarray:
         """Whether each point is inside of the mesh: bool, with the leading shape of the queries.
 
         `rule`: "crossings" (signed crossings to infinity are not 0), "parity" (their number is
         odd), "winding" (generalized winding number of 1/2 or more, Jacobson et al. 2013: for meshes
         with holes; parts far away count by a series, see `winding_number`), or "automatic": the
         first of these that the mesh is closed enough for. The first two are decided without rounding, at edges and vertices
-        too, and points of the surface are inside. Points with NaN or infinity are outside.
+        too, and points of the surface are inside. Points with NaN or infinity are outside. `mask`:
+        as in `closest_point`. The first call with another one than before makes that body anew.
         """
         asked, lead = rows(points, "points", (3,), self.dtype)
         flags = np.empty(lead, np.bool_)
-        self._core.contains(asked, flags.reshape(-1), _rule(rule), self.threads)
+        self._core.contains(asked, flags.reshape(-1), _rule(rule), self.threads, _mask(mask))
         return flags
 
-    def winding_number(self, points: ArrayLike, *, rule: str = "automatic") -> np.ndarray:
+    def winding_number(
+        self, points: ArrayLike, *, rule: str = "automatic", mask: int = ALL
+    ) -> np.ndarray:
         """The number that `contains` decides by: float64, with the leading shape; NaN for points
         with NaN or infinity.
 
@@ -107,18 +122,23 @@ class SceneQueries:
         as far as tests go. Layers that lie on each other add theirs up: 0.27 for 40 of them."""
         asked, lead = rows(points, "points", (3,), self.dtype)
         numbers = np.empty(lead, FLOAT64)
-        self._core.winding(asked, numbers.reshape(-1), _rule(rule), self.threads)
+        self._core.winding(asked, numbers.reshape(-1), _rule(rule), self.threads, _mask(mask))
         return numbers
 
     def overlaps(
-        self, other: Scene | None = None, *, narrow: bool = False, max_result_bytes: int = 0
+        self,
+        other: Scene | None = None,
+        *,
+        narrow: bool = False,
+        max_result_bytes: int = 0,
+        mask: int = ALL,
     ) -> np.ndarray | dict[str, np.ndarray]:
         """All pairs of triangles whose boxes overlap: shape (P, 2) uint32, sorted.
 
         Within this scene (i < j; pairs that share a corner are left out), or between it and `other`
         (i of this one, j of `other`). With `narrow` the triangles themselves must meet, decided
-        without rounding. `max_result_bytes` as in `all_hits`: no pair is ever dropped. TypeError
-        for scenes of different types.
+        without rounding. `max_result_bytes` as in `all_hits`: no pair is ever dropped. `mask` as in
+        `closest_point`, for both scenes. TypeError for scenes of different types.
 
         If one of the scenes is more than one mesh, a dict of such arrays: "prim", "geometry" and
         "instance", as those of a hit. Pairs are then sorted by (instance, geometry, prim) of the
@@ -130,6 +150,7 @@ class SceneQueries:
             flag(narrow, "narrow"),
             result_bytes(max_result_bytes),
             self.threads,
+            _mask(mask),
         )
         if pairs.shape[1] == 2:
             return pairs
@@ -145,9 +166,13 @@ class SceneQueries:
         require_dtype(other, self.dtype, "other")
         return other._core
 
-    def count_overlaps(self, other: Scene | None = None, *, narrow: bool = False) -> int:
+    def count_overlaps(
+        self, other: Scene | None = None, *, narrow: bool = False, mask: int = ALL
+    ) -> int:
         """How many pairs `overlaps` would give, without keeping them."""
-        return self._core.count_overlaps(self._partner(other), flag(narrow, "narrow"), self.threads)
+        return self._core.count_overlaps(
+            self._partner(other), flag(narrow, "narrow"), self.threads, _mask(mask)
+        )
 
     def touched_by(
         self,
@@ -155,17 +180,18 @@ class SceneQueries:
         spheres: ArrayLike | None = None,
         segments: ArrayLike | None = None,
         max_result_bytes: int = 0,
+        mask: int = ALL,
     ) -> dict[str, np.ndarray]:
         """All triangles and shapes that each ball (x y z radius, shape (..., 4)) or segment (two
         points, shape (..., 6)) touches.
 
         Returns a dict: "offsets" (uint64, one more than queries); "prim", "geometry" and "instance"
         as those of a hit, ascending by (instance, geometry, prim) in each row. `max_result_bytes`
-        as in `all_hits`.
+        as in `all_hits`, `mask` as in `closest_point`.
         """
         kind, shapes, _ = self._touching(spheres, segments, "touched_by")
         call = getattr(self._core, f"touched_by_{kind}")
-        offsets, names = call(shapes, result_bytes(max_result_bytes), self.threads)
+        offsets, names = call(shapes, result_bytes(max_result_bytes), self.threads, _mask(mask))
         return {
             "offsets": offsets,
             "prim": names[:, 2],
@@ -174,13 +200,18 @@ class SceneQueries:
         }
 
     def touches(
-        self, *, spheres: ArrayLike | None = None, segments: ArrayLike | None = None
+        self,
+        *,
+        spheres: ArrayLike | None = None,
+        segments: ArrayLike | None = None,
+        mask: int = ALL,
     ) -> np.ndarray:
-        """Whether each ball or segment, as for `touched_by`, touches anything: bool, with their
-        leading shape."""
+        """Whether each ball or segment, as for `touched_by`, touches anything that the mask shows:
+        bool, with their leading shape."""
         kind, shapes, lead = self._touching(spheres, segments, "touches")
         flags = np.empty(lead, np.bool_)
-        getattr(self._core, f"touches_{kind}")(shapes, flags.reshape(-1), self.threads)
+        call = getattr(self._core, f"touches_{kind}")
+        call(shapes, flags.reshape(-1), self.threads, _mask(mask))
         return flags
 
     def _touching(self, spheres: Any, segments: Any, call: str) -> tuple[str, np.ndarray, tuple]:
@@ -199,6 +230,7 @@ class SceneQueries:
         radii: ArrayLike,
         tmin: Any = None,
         tmax: Any = None,
+        mask: int = ALL,
     ) -> dict[str, np.ndarray]:
         """Where balls whose centers move along rays first touch a triangle.
 
@@ -207,21 +239,21 @@ class SceneQueries:
         there is none), "point" (..., 3), the point that is touched, "u", "v", and "prim",
         "geometry" and "instance" as those of a hit. At equal t the lower (instance, geometry, prim)
         wins. A ball that touches at the start has t = tmin. Those with a negative radius or one
-        that is not finite touch nothing, as rays that are invalid hit nothing. InputError names
-        spheres and capsules, which have no answer.
+        that is not finite touch nothing, as rays that are invalid hit nothing. `mask` as in
+        `closest_point`. InputError names spheres and capsules that it shows: they have no answer.
         """
         args, lead = ray_batch(rays, directions, tmin, tmax, self.dtype)
         balls = np.empty((len(args[0]), 9), self.dtype)
         if len(args) == 1:
             balls[:, :8] = args[0]
         else:
-            balls[:, :3], balls[:, 4:7], balls[:, 3], balls[:, 7] = (args[i] for i in (0, 1, 2, 3))
-        given = floats_of(radii, "radii", lead)
-        balls[:, 8] = given.reshape(-1)
+            with np.errstate(over="ignore"):  # beyond float32 it is infinite
+                balls[:, :3], balls[:, 4:7], balls[:, 3], balls[:, 7] = args
+        balls[:, 8] = cast(floats_of(radii, "radii", lead), self.dtype).reshape(-1)
         # prim, geometry and instance as in closest_point, behind t.
         columns = 9 if self.dtype == FLOAT32 else 8
         hits = np.empty((len(balls), columns), self.dtype)
-        self._core.sweep(balls, hits, self.threads)
+        self._core.sweep(balls, hits, self.threads, _mask(mask))
         hits = hits.reshape(lead + (columns,))
         first = self.dtype.itemsize // 4
         ids = hits.view(UINT32)[..., first : first + 3]
@@ -238,3 +270,7 @@ class SceneQueries:
 
 def _rule(rule: Any) -> str:
     return one_of(rule, "rule", RULES)
+
+
+def _mask(mask: Any) -> int:
+    return whole(mask, "mask", 0, ALL)

@@ -9,8 +9,15 @@ from typing import Any
 import numpy as np
 
 from . import _core
-from ._arrays import ALL, path, text
+from ._arrays import ALL, own_attributes, path, text
 from .cameras import Camera
+
+
+_OWN = (
+    *("dtype", "threads", "device", "name"),
+    *("_core", "_file", "_options", "_cameras", "_fitted", "_there"),
+)
+"""What a scene makes for itself."""
 
 
 class SavedScene:
@@ -51,10 +58,12 @@ class SavedScene:
         - A scene of one mesh is its arrays; its trees are built again.
         - Any other is the bytes of its .rdx file.
 
+        The copy is of the same class, with the attributes that the scene was given.
+
         InputError: changes without a commit.
         """
         with self._core.held():
-            return self._reduced()
+            return *self._reduced(), own_attributes(self, _OWN)
 
     def _reduced(self) -> tuple:
         ids, given = self._core.ids(), self._core.ids_given()
@@ -62,6 +71,8 @@ class SavedScene:
         if not committed and given:
             raise _core.InputError("the scene has changes without a commit: it cannot be copied")
         more = {
+            "type": type(self),
+            "refit_limit": self._core.refit_limit(),
             "options": self._options,
             "name": self.name,
             "cameras": self._cameras,
@@ -98,12 +109,17 @@ class SavedScene:
 def _new(more: dict[str, Any], *mesh: np.ndarray) -> Any:
     from .scene import Scene
 
-    return Scene(*mesh, **more["options"])
+    scene = object.__new__(more.get("type", Scene))
+    Scene.__init__(scene, *mesh, **more["options"])
+    return scene
 
 
 def _filled(scene: Any, more: dict[str, Any]) -> Any:
+    from .scene import tree_options
+
     scene.name, scene._cameras = more["name"], list(more["cameras"])
     scene._options = dict(more["options"])
+    scene._core.set_options(*tree_options(scene._options), more.get("refit_limit", 1.5))
     for id, own in more["attributes"].items():
         for name, (numbers, columns) in own.items():
             scene._core.set_attribute(id, name, numbers.reshape(-1), columns)
@@ -126,23 +142,25 @@ def state_of(file: Any) -> tuple[Any, int, int, int] | None:
     return file, found.st_size, found.st_mtime_ns, found.st_ino
 
 
-def _from_file(file: tuple[Any, int, int, int], more: dict[str, Any]) -> Any:
-    from .scene import load_scene
+def _read(file: Any, more: dict[str, Any]) -> Any:
+    from .scene import Scene, read_scene
 
+    return read_scene(more.get("type", Scene), file, more["threads"], more["device"])
+
+
+def _from_file(file: tuple[Any, int, int, int], more: dict[str, Any]) -> Any:
     if state_of(file[0]) != file:
         raise _core.InputError(
             f"{os.fsdecode(file[0])}: it has changed since the scene was pickled, or is gone"
         )
-    return _filled(load_scene(file[0], threads=more["threads"], device=more["device"]), more)
+    return _filled(_read(file[0], more), more)
 
 
 def _from_bytes(saved: bytes, more: dict[str, Any]) -> Any:
-    from .scene import load_scene
-
     with tempfile.TemporaryDirectory() as folder:
         file = os.path.join(folder, "scene.rdx")
         with open(file, "wb") as copy:
             copy.write(saved)
-        scene = load_scene(file, threads=more["threads"], device=more["device"])
+        scene = _read(file, more)
     scene._file = None  # the file is gone: its pages stay for as long as they are mapped
     return _filled(scene, more)

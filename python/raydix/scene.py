@@ -53,6 +53,18 @@ def _warn_of_points(count: int) -> None:
         )
 
 
+def tree_options(options: dict[str, Any]) -> tuple:
+    """What the core takes for the binary tree, of the arguments of a Scene by their names."""
+    builder, rounds = QUALITIES[options["quality"]]
+    if options["builder"] is not None:
+        builder, rounds = one_of(options["builder"], "builder", _core.builders()), 0
+    if options["reinsertion_rounds"] is not None:
+        rounds = whole(options["reinsertion_rounds"], "reinsertion_rounds", 0, 255)
+    leaf = whole(options["max_leaf"], "max_leaf", 1, 255)
+    bits = code_bits(options["bits"])
+    return builder, rounds, bits, leaf, options["strict"], options["threads"]
+
+
 class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
     """What rays are traced through and queries ask: triangle meshes, spheres, capsules, and
     instances of other scenes.
@@ -88,8 +100,9 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
     bits :
         Of the binary tree: bits of the Morton codes, 30 or 63.
     strict :
-        Triangles with a NaN, an infinite or a huge (beyond 1e12) vertex raise InputError; otherwise
-        they are left out.
+        Triangles with a NaN, an infinite or a huge (beyond 1e12) vertex raise InputError when they
+        are given. Spheres, capsules and points like that, or with a negative radius, raise it at
+        the next `commit`. Otherwise they are left out.
     usage, compact :
         As in `commit`.
     threads :
@@ -159,9 +172,6 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
     ) -> None:
         one_of(quality, "quality", QUALITIES)
         one_of(usage, "usage", USAGES)
-        asked_builder, asked_rounds = QUALITIES[quality]
-        if builder is not None:
-            asked_builder, asked_rounds = one_of(builder, "builder", _core.builders()), 0
         strict, compact = flag(strict, "strict"), flag(compact, "compact")
         device = device_name(device)
         self.dtype = float_type(precision, "precision")
@@ -192,11 +202,7 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
             )
         if compact:
             require_float32(self, "compact=True")
-        if reinsertion_rounds is not None:
-            asked_rounds = whole(reinsertion_rounds, "reinsertion_rounds", 0, 255)
-        leaf = whole(max_leaf, "max_leaf", 1, 255)
-        trees = (asked_builder, asked_rounds, code_bits(bits), leaf, strict, threads)
-        options = (*trees, quality, usage, compact)
+        options = (*tree_options(self._options), quality, usage, compact)
         self._core: Any = self._make(vertices, faces, options)
 
     def _make(self, vertices: Any, faces: Any, options: tuple) -> Any:
@@ -303,7 +309,8 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
         keep :
             Which primitives rays see, instead of all: bool, shape (primitives,), of geometry 0. Or
             a dict of such arrays by the geometry's id, or by (instance, id) for what stands in
-            instances; those that it does not name are seen.
+            instances; those that it does not name are seen. InputError: an array of another length
+            than its geometry has primitives.
         skip :
             What each ray leaves out: a dict of arrays "prim", "geometry" and "instance" with the
             leading shape of the rays, such as the hits that they start from; or an array of
@@ -520,9 +527,17 @@ def load_scene(file: str | bytes | os.PathLike, *, threads: int = 0, device: str
     InputError that names the file and what is wrong with it; so for a .rdx file that holds a tree
     and no scene.
     """
+    return read_scene(Scene, file, threads, device)
+
+
+def read_scene(
+    kind: type[Scene], file: str | bytes | os.PathLike, threads: int, device: str
+) -> Scene:
+    """As `load_scene`, of a subclass."""
     name = path(file, "file")
     precision = "float64" if _core.holds_scene_double(name) else "float32"
-    scene = Scene(threads=threads, device=device, precision=precision)
+    scene = object.__new__(kind)
+    Scene.__init__(scene, threads=threads, device=device, precision=precision)
     scene._core, scene.name, cameras = type(scene._core).load_rdx(name, scene.threads)
     scene._cameras = [Camera(**camera) for camera in cameras]
     scene._options.update(scene._core.commit_options())

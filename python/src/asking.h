@@ -34,7 +34,8 @@ using ValuesOut = Out<Scalar<Scene>, nb::ndim<1>>;
 
 /// As in_pieces, and the trees stay as they are from the first piece to the last.
 template <class Scene, class Body>
-void read_in_pieces(Scene& scene, std::size_t n, const Body& body, std::size_t first = piece_size) {
+void read_in_pieces(Scene& scene, std::size_t n, const Body& body,
+                    std::size_t first = first_piece) {
     Reading lock;
     in_pieces(
         n,

@@ -11,9 +11,13 @@
 
 namespace raydix::python {
 
-/// Queries between two looks for signals: some ten milliseconds of work, enough to keep threads
-/// busy and to let batches be sorted.
+/// Queries between two looks for signals, at most: enough to keep threads busy and to let batches
+/// be sorted.
 inline constexpr std::size_t piece_size = std::size_t{1} << 20;
+/// Of the first piece, before it is known how long a query takes.
+inline constexpr std::size_t first_piece = 4096;
+/// The same where all answers are listed: more pieces take a copy at the end.
+inline constexpr std::size_t first_listed = piece_size / 64;
 
 /// Runs Python's signal handlers, if this is the thread that may; throws what they raise.
 inline void hear_signals() {
@@ -34,9 +38,9 @@ inline void hear_signals() {
 /// with it. The first has `first` queries; the others more or fewer, by how long it took. No
 /// queries are one piece: what is wrong besides them is told.
 template <class Body>
-void in_pieces(std::size_t n, const Body& body, std::size_t first = piece_size) {
+void in_pieces(std::size_t n, const Body& body, std::size_t first = first_piece) {
     using Clock = std::chrono::steady_clock;
-    constexpr auto short_time = std::chrono::milliseconds(20), long_time = 5 * short_time;
+    constexpr auto short_time = std::chrono::milliseconds(100), long_time = 5 * short_time;
     constexpr std::size_t smallest = 1024;
     std::size_t size = first;
     std::size_t begin = 0;

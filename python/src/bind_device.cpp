@@ -144,14 +144,15 @@ void intersect_here(const DeviceScene& self, const RaysIn& rays, const HitsOut& 
     const auto results = rows_out<Hit>(out);
     if (results.size() != given.size())
         throw nb::value_error("a result has another length than its queries");
-    in_pieces(given.size(), [&](std::size_t begin, std::size_t end) {
+    const auto ask = [&](std::size_t begin, std::size_t end) {
         self.select();
         const OnDeviceOf on(self.memory());
         const DeviceBuffer<Ray> there(given.subspan(begin, end - begin));
         const HitsThere hits(end - begin);
         self.trace(there.data(), end - begin, hits, nullptr);
         hits.hits.download(results.subspan(begin, end - begin));
-    });
+    };
+    in_pieces(given.size(), ask, piece_size);  // transfers of few rays take longer than the rays
 }
 
 void occluded_here(const DeviceScene& self, const RaysIn& rays, const FlagsOut& out) {
@@ -159,14 +160,15 @@ void occluded_here(const DeviceScene& self, const RaysIn& rays, const FlagsOut& 
     const std::span results(reinterpret_cast<std::uint8_t*>(out.data()), out.shape(0));
     if (results.size() != given.size())
         throw nb::value_error("a result has another length than its queries");
-    in_pieces(given.size(), [&](std::size_t begin, std::size_t end) {
+    const auto ask = [&](std::size_t begin, std::size_t end) {
         self.select();
         const OnDeviceOf on(self.memory());
         const DeviceBuffer<Ray> there(given.subspan(begin, end - begin));
         const DeviceBuffer<std::uint8_t> flags(end - begin);
         self.trace_any(there.data(), end - begin, flags.data(), nullptr);
         flags.download(results.subspan(begin, end - begin));
-    });
+    };
+    in_pieces(given.size(), ask, piece_size);  // transfers of few rays take longer than the rays
 }
 
 /// (how Scene(device=...) names it, the driver's name, why it cannot be used or "") of each.

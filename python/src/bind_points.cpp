@@ -106,14 +106,15 @@ struct PointCalls {
                                      PointQueryOptions options, const Search& search) {
         PieceLimit limit(what, options.max_result_bytes);
         std::vector<Lists> pieces;
-        read_in_pieces(shared, queries, [&](std::size_t begin, std::size_t end) {
+        const auto ask = [&](std::size_t begin, std::size_t end) {
             pieces.push_back(limit.next([&](std::uint64_t bytes) {
                 options.max_result_bytes = bytes;
                 return search(options, begin, end);
             }));
             limit.hold(
                 piece_bytes(pieces.back(), &Lists::offsets, &Lists::indices, &Lists::distances));
-        });
+        };
+        read_in_pieces(shared, queries, ask, piece_size);  // one piece is not copied
         require_room_to_join(limit, pieces, &Lists::offsets, &Lists::indices, &Lists::distances);
         return lists_of(pieces);
     }

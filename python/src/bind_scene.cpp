@@ -51,9 +51,6 @@ static_assert(sizeof(Hit) == 6 * sizeof(float) && sizeof(HitD) == 5 * sizeof(dou
 template <class Scene>
 using HitRows = Out<Scalar<Scene>, nb::shape<-1, hit_columns<Scene>>>;
 
-/// Of rays whose hits are all listed, which may be many.
-constexpr std::size_t first_listed = piece_size / 64;
-
 /// So few rays are traced on the caller's thread, one by one: a batch's set-up would cost more.
 constexpr std::size_t few_rays = 8;
 
@@ -175,7 +172,8 @@ Counts count_hits(Scene& scene, Rays& rays, const Out<std::uint32_t, nb::ndim<1>
     // Smaller pieces: what is counted is first listed.
     const auto count = [&](std::size_t begin, std::size_t end) {
         constexpr std::size_t part = piece_size / 8;
-        for (std::size_t first = begin; first < end; first += part) {
+        std::size_t first = begin;
+        do {  // once without rays too: what is wrong besides them is told
             const std::size_t last = std::min(end, first + part);
             const auto all =
                 scene.trace_all(rays.piece(first, last), piece_of(options, first, last));
@@ -184,7 +182,8 @@ Counts count_hits(Scene& scene, Rays& rays, const Out<std::uint32_t, nb::ndim<1>
                     static_cast<std::uint32_t>(all.offsets[i - first + 1] - all.offsets[i - first]);
             counts.first += all.counts.hits;
             counts.second += all.counts.invalid_rays;
-        }
+            first = last;
+        } while (first < end);
     };
     read_in_pieces(scene, rays.size(), count, first_listed);
     return counts;
@@ -208,7 +207,7 @@ void fill_for_hits(Scene& scene, const HitsIn<Scene>& hits, const MaybeRays<Scen
     std::span<const Ray> rays;
     if (with) rays = raydix::python::rows<Ray>(*with);
     if (with) require_length(rays.size(), given.size());
-    read_in_pieces(scene, given.size(), [&](std::size_t begin, std::size_t end) {
+    const auto fill = [&](std::size_t begin, std::size_t end) {
         const std::size_t n = end - begin;
         if (with)
             call(scene.traced(), rays.subspan(begin, n), given.subspan(begin, n),
@@ -216,7 +215,9 @@ void fill_for_hits(Scene& scene, const HitsIn<Scene>& hits, const MaybeRays<Scen
         else
             call(scene.traced(), given.subspan(begin, n), points.subspan(begin, n),
                  threads_for(threads));
-    });
+    };
+    read_in_pieces(scene, given.size(), fill,
+                   piece_size);  // errors count hits from a piece's first
 }
 
 template <class Scene>

@@ -22,6 +22,7 @@
 #include <vector>
 
 #include "arrays.h"
+#include "asking.h"
 #include "batch.h"
 #include "bindings.h"
 #include "figures.h"
@@ -34,8 +35,6 @@ template <class Scene>
 using TransformRows = In<typename Scene::Types::Scalar, nb::shape<-1, 12>>;
 static_assert(sizeof(Transform) == 12 * sizeof(float));
 static_assert(sizeof(TransformD) == 12 * sizeof(double));
-template <class Scene>
-using PointRows = In<typename Scene::Types::Scalar, nb::shape<-1, 3>>;
 
 BuildOptions build_options(const std::string& builder, int reinsertion_rounds, int bits,
                            int max_leaf, bool strict, int threads) {
@@ -69,10 +68,11 @@ Usage usage_of(const std::string& name) {
 }
 
 SceneOptions scene_options(const std::string& quality, const std::string& usage, bool compact,
-                           int threads) {
+                           bool strict, int threads) {
     return {.quality = quality_of(quality),
             .usage = usage_of(usage),
             .compact = compact,
+            .strict = strict,
             .threads = threads};
 }
 
@@ -121,7 +121,7 @@ nb::tuple load(const nb::bytes& file, std::uint64_t seed, const std::string& bui
                const std::string& quality, const std::string& usage, bool compact) {
     const BuildOptions trees =
         build_options(builder, reinsertion_rounds, bits, max_leaf, strict, threads);
-    const SceneOptions commits = scene_options(quality, usage, compact, threads);
+    const SceneOptions commits = scene_options(quality, usage, compact, strict, threads);
     const std::string spec = path_of(file);
     std::string name, cameras_fault;
     std::vector<Camera> shown;
@@ -314,6 +314,21 @@ void bind_commits(nb::class_<Scene>& scene) {
              nb::arg("progress").none())
         .def("refit", &refit<Scene>, nb::arg("vertices").noconvert(), nb::arg("threads") = 0)
         .def("commit_options", &commit_options<Scene>)
+        .def("refit_limit",
+             [](Scene& self) {
+                 return while_reading(self, [&] { return self.commit_options().refit_limit; });
+             })
+        .def(
+            "set_options",
+            [](Scene& self, const std::string& builder, int reinsertion_rounds, int bits,
+               int max_leaf, bool strict, int threads, double refit_limit) {
+                const nb::gil_scoped_release unlocked;
+                self.set_options(
+                    build_options(builder, reinsertion_rounds, bits, max_leaf, strict, threads),
+                    refit_limit);
+            },
+            nb::arg("builder"), nb::arg("reinsertion_rounds"), nb::arg("bits"), nb::arg("max_leaf"),
+            nb::arg("strict"), nb::arg("threads"), nb::arg("refit_limit"))
         .def("committed",
              [](Scene& self) { return while_reading(self, [&] { return self.committed(); }); })
         .def("bounds",
@@ -337,7 +352,7 @@ void bind_making(nb::class_<Scene>& scene) {
            bool compact) {
             new (self)
                 Scene(build_options(builder, reinsertion_rounds, bits, max_leaf, strict, threads),
-                      scene_options(quality, usage, compact, threads));
+                      scene_options(quality, usage, compact, strict, threads));
         },
         nb::arg("builder"), nb::arg("reinsertion_rounds"), nb::arg("bits"), nb::arg("max_leaf"),
         nb::arg("strict"), nb::arg("threads"), nb::arg("quality"), nb::arg("usage"),
@@ -351,7 +366,7 @@ void bind_making(nb::class_<Scene>& scene) {
             new (self)
                 Scene(copy_of<typename Scene::Types>(vertices, faces),
                       build_options(builder, reinsertion_rounds, bits, max_leaf, strict, threads),
-                      scene_options(quality, usage, compact, threads));
+                      scene_options(quality, usage, compact, strict, threads));
         },
         nb::arg("vertices").noconvert(), nb::arg("faces").noconvert(), nb::arg("builder"),
         nb::arg("reinsertion_rounds"), nb::arg("bits"), nb::arg("max_leaf"), nb::arg("strict"),
@@ -390,9 +405,6 @@ template void bind_changes(nb::class_<SceneTrees>& scene);
 template void bind_changes(nb::class_<SceneTreesD>& scene);
 
 namespace {
-
-template <class Scene>
-using Scalar = typename Scene::Types::Scalar;
 
 /// Rows of numbers that are one shape each.
 template <class Shape, class Scene>

@@ -41,15 +41,16 @@ static_assert(sizeof(SceneClosestPoint) == 9 * sizeof(float) &&
 
 template <class Scene>
 Counts closest(Scene& scene, const PointRows<Scene>& points, const PlaceRows<Scene>& out,
-               Scalar<Scene> max_distance, int threads) {
+               Scalar<Scene> max_distance, int threads, std::uint32_t mask) {
     const auto queries = rows<Point<Scene>>(points);
     const auto results = rows_out<typename Scene::Types::ClosestPoint>(out);
     require_length(results.size(), queries.size());
+    const typename Scene::Types::SceneClosestOptions options{
+        .max_distance = max_distance, .mask = mask, .threads = threads_for(threads)};
     Counts counts{0, 0};
     read_in_pieces(scene, queries.size(), [&](std::size_t begin, std::size_t end) {
         const QueryCounts met = scene.closest_points(queries.subspan(begin, end - begin),
-                                                     results.subspan(begin, end - begin),
-                                                     max_distance, threads_for(threads));
+                                                     results.subspan(begin, end - begin), options);
         counts.first += met.found;
         counts.second += met.invalid_queries;
     });
@@ -69,7 +70,8 @@ InsideRule inside_rule(const std::string& name) {
 
 template <class Scene>
 Counts signed_distance(Scene& scene, const PointRows<Scene>& points, const ValuesOut<Scene>& out,
-                       Scalar<Scene> max_distance, const std::string& rule_name, int threads) {
+                       Scalar<Scene> max_distance, const std::string& rule_name, int threads,
+                       std::uint32_t mask) {
     const auto queries = rows<Point<Scene>>(points);
     const std::span distances(out.data(), out.shape(0));
     require_length(distances.size(), queries.size());
@@ -78,7 +80,7 @@ Counts signed_distance(Scene& scene, const PointRows<Scene>& points, const Value
                                                         .threads = threads_for(threads)};
     Counts counts{0, 0};
     read_in_pieces(scene, queries.size(), [&](std::size_t begin, std::size_t end) {
-        const QueryCounts met = signed_distances(scene.solid(rule, "signed_distance"),
+        const QueryCounts met = signed_distances(*scene.solid(rule, mask, "signed_distance"),
                                                  queries.subspan(begin, end - begin),
                                                  distances.subspan(begin, end - begin), options);
         counts.first += met.found;
@@ -89,7 +91,7 @@ Counts signed_distance(Scene& scene, const PointRows<Scene>& points, const Value
 
 template <class Scene>
 Counts inside(Scene& scene, const PointRows<Scene>& points, const FlagsOut& out,
-              const std::string& rule_name, int threads) {
+              const std::string& rule_name, int threads, std::uint32_t mask) {
     const auto queries = rows<Point<Scene>>(points);
     const std::span flags(reinterpret_cast<std::uint8_t*>(out.data()), out.shape(0));
     require_length(flags.size(), queries.size());
@@ -97,7 +99,7 @@ Counts inside(Scene& scene, const PointRows<Scene>& points, const FlagsOut& out,
     Counts counts{0, 0};
     read_in_pieces(scene, queries.size(), [&](std::size_t begin, std::size_t end) {
         const QueryCounts met =
-            contains(scene.solid(rule, "contains"), queries.subspan(begin, end - begin),
+            contains(*scene.solid(rule, mask, "contains"), queries.subspan(begin, end - begin),
                      flags.subspan(begin, end - begin), threads_for(threads));
         counts.first += met.found;
         counts.second += met.invalid_queries;
@@ -107,13 +109,13 @@ Counts inside(Scene& scene, const PointRows<Scene>& points, const FlagsOut& out,
 
 template <class Scene>
 void winding(Scene& scene, const PointRows<Scene>& points, const Out<double, nb::ndim<1>>& out,
-             const std::string& rule_name, int threads) {
+             const std::string& rule_name, int threads, std::uint32_t mask) {
     const auto queries = rows<Point<Scene>>(points);
     require_length(out.shape(0), queries.size());
     const InsideRule rule = inside_rule(rule_name);
     read_in_pieces(scene, queries.size(), [&](std::size_t begin, std::size_t end) {
         const std::vector<double> numbers =
-            winding_numbers(scene.solid(rule, "winding_number"),
+            winding_numbers(*scene.solid(rule, mask, "winding_number"),
                             queries.subspan(begin, end - begin), threads_for(threads));
         std::copy(numbers.begin(), numbers.end(), out.data() + begin);
     });
@@ -127,8 +129,8 @@ nb::tuple closure(Scene& scene) {
     const auto [kind, open_edges, rule] = [&] {
         const nb::gil_scoped_release unlocked;
         const auto lock = scene.read();
-        const auto& solid = scene.solid(InsideRule::automatic, "closure");
-        return std::tuple(solid.closure(), solid.open_edges(), solid.rule());
+        const auto solid = scene.solid(InsideRule::automatic, every_bit, "closure");
+        return std::tuple(solid->closure(), solid->open_edges(), solid->rule());
     }();
     return nb::make_tuple(closures[static_cast<int>(kind)], open_edges,
                           rules[static_cast<int>(rule)]);
@@ -147,21 +149,31 @@ auto with_two(Scene& scene, Scene* other, const Call& call) {
     return call(scene.is_mesh() && other->is_mesh(), other);
 }
 
+/// Whether a mask shows both meshes. `other` may be null.
+template <class Scene>
+bool shows_meshes(const Scene& scene, const Scene* other, std::uint32_t mask) {
+    return scene.shows_mesh(mask) && (other == nullptr || other->shows_mesh(mask));
+}
+
 /// Two columns of meshes; of other scenes six: instance, geometry and prim of the first, and of the
 /// second.
 template <class Scene>
 Array2<std::uint32_t> overlaps(Scene& scene, Scene* other, bool narrow,
-                               std::uint64_t max_result_bytes, int threads) {
+                               std::uint64_t max_result_bytes, int threads, std::uint32_t mask) {
     const PairOptions options{
         .narrow = narrow, .max_result_bytes = max_result_bytes, .threads = threads_for(threads)};
-    const ScenePairOptions of_scenes{
-        .narrow = narrow, .max_result_bytes = max_result_bytes, .threads = threads_for(threads)};
+    const ScenePairOptions of_scenes{.narrow = narrow,
+                                     .mask = mask,
+                                     .max_result_bytes = max_result_bytes,
+                                     .threads = threads_for(threads)};
     std::vector<PrimitivePair> pairs;
     std::optional<ScenePairs> named;
     with_two(scene, other, [&](bool are_meshes, Scene* b) {
         if (!are_meshes)
             named = b != nullptr ? overlapping_pairs(scene.traced(), b->traced(), of_scenes)
                                  : overlapping_pairs(scene.traced(), of_scenes);
+        else if (!shows_meshes(scene, b, mask))
+            return;
         else if (b != nullptr)
             pairs = overlapping_pairs(scene.bvh("overlaps"), b->bvh("overlaps"), options);
         else
@@ -172,13 +184,16 @@ Array2<std::uint32_t> overlaps(Scene& scene, Scene* other, bool narrow,
 }
 
 template <class Scene>
-std::uint64_t count_overlaps(Scene& scene, Scene* other, bool narrow, int threads) {
+std::uint64_t count_overlaps(Scene& scene, Scene* other, bool narrow, int threads,
+                             std::uint32_t mask) {
     const PairOptions options{.narrow = narrow, .threads = threads_for(threads)};
-    const ScenePairOptions of_scenes{.narrow = narrow, .threads = threads_for(threads)};
-    return with_two(scene, other, [&](bool are_meshes, Scene* b) {
+    const ScenePairOptions of_scenes{
+        .narrow = narrow, .mask = mask, .threads = threads_for(threads)};
+    return with_two(scene, other, [&](bool are_meshes, Scene* b) -> std::uint64_t {
         if (!are_meshes)
             return b != nullptr ? count_overlapping_pairs(scene.traced(), b->traced(), of_scenes)
                                 : count_overlapping_pairs(scene.traced(), of_scenes);
+        if (!shows_meshes(scene, b, mask)) return 0;
         return b != nullptr ? count_overlapping_pairs(scene.bvh("count_overlaps"),
                                                       b->bvh("count_overlaps"), options)
                             : count_overlapping_pairs(scene.bvh("count_overlaps"), options);
@@ -186,15 +201,16 @@ std::uint64_t count_overlaps(Scene& scene, Scene* other, bool narrow, int thread
 }
 
 template <class Shape, class Scene, class Array>
-Counts touches(Scene& scene, const Array& shapes, const FlagsOut& out, int threads) {
+Counts touches(Scene& scene, const Array& shapes, const FlagsOut& out, int threads,
+               std::uint32_t mask) {
     const auto queries = rows<Shape>(shapes);
     const std::span flags(reinterpret_cast<std::uint8_t*>(out.data()), out.shape(0));
     require_length(flags.size(), queries.size());
+    const SceneOverlapOptions options{.mask = mask, .threads = threads_for(threads)};
     Counts counts{0, 0};
     read_in_pieces(scene, queries.size(), [&](std::size_t begin, std::size_t end) {
-        const QueryCounts met =
-            scene.touch_any(queries.subspan(begin, end - begin), flags.subspan(begin, end - begin),
-                            threads_for(threads));
+        const QueryCounts met = scene.touch_any(queries.subspan(begin, end - begin),
+                                                flags.subspan(begin, end - begin), options);
         counts.first += met.found;
         counts.second += met.invalid_queries;
     });
@@ -216,15 +232,15 @@ static_assert(sizeof(SphereSweepD) == 9 * sizeof(double) &&
 
 template <class Scene>
 Counts sweeps(Scene& scene, const SweepRows<Scene>& balls, const ContactRows<Scene>& out,
-              int threads) {
+              int threads, std::uint32_t mask) {
     const auto queries = rows<typename Scene::Types::Sweep>(balls);
     const auto hits = rows_out<typename Scene::Types::SweepHit>(out);
     require_length(hits.size(), queries.size());
+    const SceneOverlapOptions options{.mask = mask, .threads = threads_for(threads)};
     Counts counts{0, 0};
     read_in_pieces(scene, queries.size(), [&](std::size_t begin, std::size_t end) {
-        const QueryCounts met =
-            scene.sweep_spheres(queries.subspan(begin, end - begin),
-                                hits.subspan(begin, end - begin), threads_for(threads));
+        const QueryCounts met = scene.sweep_spheres(queries.subspan(begin, end - begin),
+                                                    hits.subspan(begin, end - begin), options);
         counts.first += met.found;
         counts.second += met.invalid_queries;
     });
@@ -233,18 +249,21 @@ Counts sweeps(Scene& scene, const SweepRows<Scene>& balls, const ContactRows<Sce
 
 /// Offsets, and rows of instance, geometry and prim.
 template <class Shape, class Scene, class Array>
-nb::tuple touched(Scene& scene, const Array& shapes, std::uint64_t max_result_bytes, int threads) {
+nb::tuple touched(Scene& scene, const Array& shapes, std::uint64_t max_result_bytes, int threads,
+                  std::uint32_t mask) {
     using Lists = SceneOverlapLists;
     const auto queries = rows<Shape>(shapes);
     PieceLimit limit("touched_by", max_result_bytes);
     std::vector<Lists> pieces;
-    read_in_pieces(scene, queries.size(), [&](std::size_t begin, std::size_t end) {
+    const auto ask = [&](std::size_t begin, std::size_t end) {
         pieces.push_back(limit.next([&](std::uint64_t bytes) {
-            return scene.touch_all(queries.subspan(begin, end - begin), bytes,
-                                   threads_for(threads));
+            return scene.touch_all(
+                queries.subspan(begin, end - begin),
+                {.mask = mask, .max_result_bytes = bytes, .threads = threads_for(threads)});
         }));
         limit.hold(piece_bytes(pieces.back(), &Lists::offsets, &Lists::prims));
-    });
+    };
+    read_in_pieces(scene, queries.size(), ask, first_listed);
     require_room_to_join(limit, pieces, &Lists::offsets, &Lists::prims);
     auto offsets = join_offsets(pieces);
     return nb::make_tuple(offsets,
@@ -259,32 +278,34 @@ void bind_queries(nb::class_<Scene>& scene) {
     using Segment = typename Scene::Types::Segment;
     using Spheres = In<Scalar<Scene>, nb::shape<-1, 4>>;
     using Segments = In<Scalar<Scene>, nb::shape<-1, 6>>;
+    const auto mask = nb::arg("mask") = every_bit;
     scene
         .def("closest", &closest<Scene>, nb::arg("points").noconvert(), nb::arg("out").noconvert(),
-             nb::arg("max_distance"), nb::arg("threads") = 0)
+             nb::arg("max_distance"), nb::arg("threads") = 0, mask)
         .def("signed_distance", &signed_distance<Scene>, nb::arg("points").noconvert(),
              nb::arg("out").noconvert(), nb::arg("max_distance"), nb::arg("rule"),
-             nb::arg("threads") = 0)
+             nb::arg("threads") = 0, mask)
         .def("contains", &inside<Scene>, nb::arg("points").noconvert(),
-             nb::arg("flags").noconvert(), nb::arg("rule"), nb::arg("threads") = 0)
+             nb::arg("flags").noconvert(), nb::arg("rule"), nb::arg("threads") = 0, mask)
         .def("winding", &winding<Scene>, nb::arg("points").noconvert(), nb::arg("out").noconvert(),
-             nb::arg("rule"), nb::arg("threads") = 0)
+             nb::arg("rule"), nb::arg("threads") = 0, mask)
         .def("closure", &closure<Scene>)
         .def("overlaps", &overlaps<Scene>, nb::arg("other").none(), nb::arg("narrow"),
-             nb::arg("max_result_bytes") = 0, nb::arg("threads") = 0)
+             nb::arg("max_result_bytes") = 0, nb::arg("threads") = 0, mask)
         .def("count_overlaps", &count_overlaps<Scene>, nb::arg("other").none(), nb::arg("narrow"),
-             nb::arg("threads") = 0)
+             nb::arg("threads") = 0, mask)
         .def("touches_spheres", &touches<Sphere, Scene, Spheres>, nb::arg("spheres").noconvert(),
-             nb::arg("flags").noconvert(), nb::arg("threads") = 0)
+             nb::arg("flags").noconvert(), nb::arg("threads") = 0, mask)
         .def("touches_segments", &touches<Segment, Scene, Segments>,
-             nb::arg("segments").noconvert(), nb::arg("flags").noconvert(), nb::arg("threads") = 0)
+             nb::arg("segments").noconvert(), nb::arg("flags").noconvert(), nb::arg("threads") = 0,
+             mask)
         .def("sweep", &sweeps<Scene>, nb::arg("sweeps").noconvert(), nb::arg("hits").noconvert(),
-             nb::arg("threads") = 0)
+             nb::arg("threads") = 0, mask)
         .def("touched_by_spheres", &touched<Sphere, Scene, Spheres>, nb::arg("spheres").noconvert(),
-             nb::arg("max_result_bytes") = 0, nb::arg("threads") = 0)
+             nb::arg("max_result_bytes") = 0, nb::arg("threads") = 0, mask)
         .def("touched_by_segments", &touched<Segment, Scene, Segments>,
              nb::arg("segments").noconvert(), nb::arg("max_result_bytes") = 0,
-             nb::arg("threads") = 0);
+             nb::arg("threads") = 0, mask);
 }
 
 template void bind_queries(nb::class_<SceneTrees>& scene);

@@ -21,14 +21,17 @@ std::mutex& structure() {
 
 namespace {
 
+/// Throws InputError, with the first rays of a call, as require_lengths does.
 template <class Scalar>
-BasicSceneTraceOptions<Scalar> trace_options(const RayOptions& options) {
+BasicSceneTraceOptions<Scalar> trace_options(const BasicScene<Scalar>& scene,
+                                             const RayOptions& options) {
     BasicSceneTraceOptions<Scalar> out;
     out.mask = options.mask;
     out.masks = options.masks;
     out.threads = options.threads;
     out.max_result_bytes = options.max_result_bytes;
     if (options.filter != nullptr) {
+        if (options.first == 0) require_lengths(*options.filter, scene);
         out.filter = [filter = options.filter, first = options.first](
                          std::size_t place, const auto&, const auto& hit) {
             return filter->takes(first + place, hit);
@@ -284,6 +287,15 @@ CommitReport BasicSceneTrees<Names>::commit_now(SceneOptions options) {
 }
 
 template <class Names>
+void BasicSceneTrees<Names>::set_options(const BuildOptions& trees, double refit_limit) {
+    const Writing lock("set_options", locks_);
+    options_ = trees;
+    this->drop_trees();
+    commits_.strict = trees.strict;
+    commits_.refit_limit = refit_limit;
+}
+
+template <class Names>
 CommitReport BasicSceneTrees<Names>::commit(const SceneOptions& options) {
     const Writing lock("commit", locks_);
     // The scenes that this one places must stay as they are meanwhile. Past their queues: whoever
@@ -373,7 +385,7 @@ BasicSceneTrees<Names>::any_attribute(const std::string& name) const {
 /// After a commit, or in its place.
 template <class Names>
 void BasicSceneTrees<Names>::look_for_mesh() {
-    for (auto& solid : scene_solids_) solid.reset();
+    scene_solids_ = {};
     mesh_id_.reset();
     mesh_mask_ = 0;
     why_no_mesh_.clear();
@@ -485,72 +497,73 @@ void BasicSceneTrees<Names>::read_all(std::set<const BasicSceneTrees*>& known,
 }
 
 template <class Names>
-QueryCounts BasicSceneTrees<Names>::closest_points(std::span<const Point> queries,
-                                                   std::span<typename Names::ClosestPoint> results,
-                                                   typename Names::Scalar max_distance,
-                                                   int threads) {
-    return raydix::closest_points(traced(), queries, results,
-                                  {.max_distance = max_distance, .threads = threads});
+QueryCounts BasicSceneTrees<Names>::closest_points(
+    std::span<const Point> queries, std::span<typename Names::ClosestPoint> results,
+    const typename Names::SceneClosestOptions& options) {
+    return raydix::closest_points(traced(), queries, results, options);
 }
 
 template <class Names>
 template <class Shape>
 SceneOverlapLists BasicSceneTrees<Names>::touch_all(std::span<const Shape> queries,
-                                                    std::uint64_t max_result_bytes, int threads) {
-    return raydix::touch_all(traced(), queries,
-                             {.max_result_bytes = max_result_bytes, .threads = threads});
+                                                    const SceneOverlapOptions& options) {
+    return raydix::touch_all(traced(), queries, options);
 }
 
 template <class Names>
 template <class Shape>
 QueryCounts BasicSceneTrees<Names>::touch_any(std::span<const Shape> queries,
-                                              std::span<std::uint8_t> touched, int threads) {
-    return raydix::touch_any(traced(), queries, touched, {.threads = threads});
+                                              std::span<std::uint8_t> touched,
+                                              const SceneOverlapOptions& options) {
+    return raydix::touch_any(traced(), queries, touched, options);
 }
 
 template <class Names>
 QueryCounts BasicSceneTrees<Names>::sweep_spheres(std::span<const typename Names::Sweep> sweeps,
                                                   std::span<typename Names::SweepHit> hits,
-                                                  int threads) {
-    return raydix::sweep_spheres(traced(), sweeps, hits, {.threads = threads});
+                                                  const SceneOverlapOptions& options) {
+    return raydix::sweep_spheres(traced(), sweeps, hits, options);
 }
 
 template <class Names>
-const typename Names::Solid& BasicSceneTrees<Names>::solid(InsideRule rule, const char* call) {
-    if (this->is_mesh()) return MeshTrees<Names>::solid(rule, call);
+std::shared_ptr<const typename Names::Solid> BasicSceneTrees<Names>::solid(InsideRule rule,
+                                                                           std::uint32_t mask,
+                                                                           const char* call) {
+    if (this->is_mesh() && shows_mesh(mask))
+        return {std::shared_ptr<const void>(), &MeshTrees<Names>::solid(rule, call)};
     const std::lock_guard lock(locks_.build());
     settle();
-    std::optional<typename Names::Solid>& kept = scene_solids_[static_cast<std::size_t>(rule)];
-    if (kept) return *kept;
+    KeptSolid& kept = scene_solids_[static_cast<std::size_t>(rule)];
+    if (kept.solid != nullptr && kept.mask == mask) return kept.solid;
+    const SceneSolidOptions options{
+        .rule = rule, .mask = mask, .threads = threads_for(options_.threads)};
     try {
-        kept.emplace(scene_,
-                     SceneSolidOptions{.rule = rule, .threads = threads_for(options_.threads)});
+        kept = {mask, std::make_shared<const typename Names::Solid>(scene_, options)};
     } catch (const ResultTooLarge&) {
         throw;
     } catch (const InputError& error) {
         throw InputError(std::string(call) + ": " + error.what());
     }
-    return *kept;
+    return kept.solid;
 }
 
 template <class Names>
 TraceCounts BasicSceneTrees<Names>::trace(std::span<const Ray> rays, std::span<Hit> hits,
                                           const RayOptions& options) {
-    return raydix::trace(traced(), rays, hits, trace_options<typename Names::Scalar>(options));
+    return raydix::trace(traced(), rays, hits, trace_options(traced(), options));
 }
 
 template <class Names>
 TraceCounts BasicSceneTrees<Names>::trace_any(std::span<const Ray> rays,
                                               std::span<std::uint8_t> occluded,
                                               const RayOptions& options) {
-    return raydix::trace_any(traced(), rays, occluded,
-                             trace_options<typename Names::Scalar>(options));
+    return raydix::trace_any(traced(), rays, occluded, trace_options(traced(), options));
 }
 
 template <class Names>
 typename Names::AllHits BasicSceneTrees<Names>::trace_all(std::span<const Ray> rays,
                                                           const RayOptions& options) {
-    return raydix::trace_all(traced(), rays, trace_options<typename Names::Scalar>(options));
+    return raydix::trace_all(traced(), rays, trace_options(traced(), options));
 }
 
 template <class Names>
@@ -565,14 +578,21 @@ bool BasicSceneTrees<Names>::any_hit(const Ray& ray, std::uint32_t mask) {
 
 template class BasicSceneTrees<InFloat>;
 template class BasicSceneTrees<InDouble>;
-template QueryCounts SceneTrees::touch_any(std::span<const Segment>, std::span<std::uint8_t>, int);
-template QueryCounts SceneTrees::touch_any(std::span<const Sphere>, std::span<std::uint8_t>, int);
+template QueryCounts SceneTrees::touch_any(std::span<const Segment>, std::span<std::uint8_t>,
+                                           const SceneOverlapOptions&);
+template QueryCounts SceneTrees::touch_any(std::span<const Sphere>, std::span<std::uint8_t>,
+                                           const SceneOverlapOptions&);
 template QueryCounts SceneTreesD::touch_any(std::span<const SegmentD>, std::span<std::uint8_t>,
-                                            int);
-template QueryCounts SceneTreesD::touch_any(std::span<const SphereD>, std::span<std::uint8_t>, int);
-template SceneOverlapLists SceneTrees::touch_all(std::span<const Segment>, std::uint64_t, int);
-template SceneOverlapLists SceneTrees::touch_all(std::span<const Sphere>, std::uint64_t, int);
-template SceneOverlapLists SceneTreesD::touch_all(std::span<const SegmentD>, std::uint64_t, int);
-template SceneOverlapLists SceneTreesD::touch_all(std::span<const SphereD>, std::uint64_t, int);
+                                            const SceneOverlapOptions&);
+template QueryCounts SceneTreesD::touch_any(std::span<const SphereD>, std::span<std::uint8_t>,
+                                            const SceneOverlapOptions&);
+template SceneOverlapLists SceneTrees::touch_all(std::span<const Segment>,
+                                                 const SceneOverlapOptions&);
+template SceneOverlapLists SceneTrees::touch_all(std::span<const Sphere>,
+                                                 const SceneOverlapOptions&);
+template SceneOverlapLists SceneTreesD::touch_all(std::span<const SegmentD>,
+                                                  const SceneOverlapOptions&);
+template SceneOverlapLists SceneTreesD::touch_all(std::span<const SphereD>,
+                                                  const SceneOverlapOptions&);
 
 }  // namespace raydix::python

@@ -65,6 +65,7 @@ struct NamesIn {
     using AllHits = BasicAllHits<Scalar>;
     using ClosestPoint = BasicSceneClosestPoint<Scalar>;
     using ClosestOptions = BasicClosestOptions<Scalar>;
+    using SceneClosestOptions = BasicSceneClosestOptions<Scalar>;
     using Sweep = BasicSphereSweep<Scalar>;
     using SweepHit = BasicSceneSweepHit<Scalar>;
     using Segment = BasicSegment<Scalar>;
@@ -93,9 +94,12 @@ struct MeshArrays {
     friend bool operator==(const MeshArrays&, const MeshArrays&) = default;
 };
 
+/// The mask of a call that is given none.
+inline constexpr std::uint32_t every_bit = 0xFFFFFFFFu;
+
 /// What a call with rays has beside them.
 struct RayOptions {
-    std::uint32_t mask = 0xFFFFFFFFu;
+    std::uint32_t mask = every_bit;
     std::span<const std::uint32_t> masks = {};  // of each ray, instead; or empty
     int threads = 0;
     std::uint64_t max_result_bytes = 0;
@@ -203,6 +207,9 @@ public:
     /// one. Throws InputError as Refitter::refit does, and if there are changes without a commit.
     RefitQuality refit(Vertices vertices, int threads);
 
+    /// Those that a scene of a file does not come with: of the binary tree, and of later commits.
+    void set_options(const BuildOptions& trees, double refit_limit);
+
     // While reading.
     /// Of the last commit.
     [[nodiscard]] const SceneOptions& commit_options() const { return commits_; }
@@ -216,6 +223,10 @@ public:
     [[nodiscard]] std::optional<std::uint32_t> mesh_id() const { return mesh_id_; }
     /// Its mask; 0 if there is none.
     [[nodiscard]] std::uint32_t mesh_mask() const { return mesh_mask_; }
+    /// Whether a mask shows the mesh of a scene that is one. That of all bits always does.
+    [[nodiscard]] bool shows_mesh(std::uint32_t mask) const {
+        return mask == every_bit || (mask & mesh_mask_) != 0;
+    }
     /// Of any geometry, changes without a commit included. Throws InputError: there is none.
     [[nodiscard]] std::uint32_t mask_of(std::uint32_t id) const { return scene_.mask(id); }
     /// Those of a mesh; a copy of what still lies in the file of the scene. None of all else.
@@ -238,18 +249,21 @@ public:
     using Point = typename Names::Point;
     QueryCounts closest_points(std::span<const Point> queries,
                                std::span<typename Names::ClosestPoint> results,
-                               typename Names::Scalar max_distance, int threads);
+                               const typename Names::SceneClosestOptions& options);
     template <class Shape>
     [[nodiscard]] SceneOverlapLists touch_all(std::span<const Shape> queries,
-                                              std::uint64_t max_result_bytes, int threads);
+                                              const SceneOverlapOptions& options);
     template <class Shape>
     QueryCounts touch_any(std::span<const Shape> queries, std::span<std::uint8_t> touched,
-                          int threads);
+                          const SceneOverlapOptions& options);
     QueryCounts sweep_spheres(std::span<const typename Names::Sweep> sweeps,
-                              std::span<typename Names::SweepHit> hits, int threads);
-    /// All meshes as one body, whatever else there is. Throws InputError, which names the call:
-    /// what raydix::Solid throws.
-    [[nodiscard]] const typename Names::Solid& solid(InsideRule rule, const char* call);
+                              std::span<typename Names::SweepHit> hits,
+                              const SceneOverlapOptions& options);
+    /// All meshes that the mask shows as one body. Throws InputError, which names the call: what
+    /// raydix::Solid throws. The last mask's body is kept for each rule.
+    [[nodiscard]] std::shared_ptr<const typename Names::Solid> solid(InsideRule rule,
+                                                                     std::uint32_t mask,
+                                                                     const char* call);
 
     TraceCounts trace(std::span<const Ray> rays, std::span<Hit> hits, const RayOptions& options);
     TraceCounts trace_any(std::span<const Ray> rays, std::span<std::uint8_t> occluded,
@@ -311,7 +325,12 @@ private:
     std::optional<std::uint32_t> mesh_id_;
     std::uint32_t mesh_mask_ = 0;
     std::optional<typename Names::Refitter> refitter_;
-    std::array<std::optional<typename Names::Solid>, 4> scene_solids_;  // by rule, if not a mesh's
+    /// Of what a mask shows.
+    struct KeptSolid {
+        std::uint32_t mask = 0;
+        std::shared_ptr<const typename Names::Solid> solid = {};  // null: not made
+    };
+    std::array<KeptSolid, 4> scene_solids_;  // by rule, if not a mesh's
 };
 
 template <class Names>

@@ -188,11 +188,8 @@ template <class Scalar>
 void FlatPlan<Scalar>::refuse_shapes(const Tree& scene, std::uint32_t number,
                                      const char* call) const {
     if (const auto* const shapes = seen_shapes(scene, mask_))
-        throw InputError(
-            std::string(call) + ": geometry " + std::to_string(shapes->id) + " (" +
-            kind_of(shapes->shapes) + ")" +
-            (number == 0 ? std::string() : " on path " + std::to_string(number) + " of instances") +
-            " is no triangle mesh");
+        throw InputError(std::string(call) + ": " + name_of(*shapes, number) +
+                         " is no triangle mesh");
     for (const auto& instance : scene.instances)
         if ((instance.mask & mask_) != 0 && counts_of(*instance.scene).has_shapes)
             refuse_shapes(*instance.scene, number + instance.number, call);

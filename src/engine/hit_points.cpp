@@ -139,12 +139,9 @@ template <class Tree, class AnyHit>
         left -= instance.number;
         inner = instance.scene.get();
     }
-    const std::string where =
-        hit.instance == 0 ? "" : " on path " + std::to_string(hit.instance) + " of instances";
     for (const auto& shapes : inner->shapes) {
         if (shapes->id != hit.geometry) continue;
-        const std::string geometry = "geometry " + std::to_string(hit.geometry) + " (" +
-                                     kind_of(shapes->shapes) + ")" + where;
+        const std::string geometry = name_of(*shapes, hit.instance);
         const std::uint64_t count = count_of(shapes->shapes);
         if (hit.prim < count)
             throw InputError(start + geometry + " has no triangles: give the rays too");
@@ -152,12 +149,14 @@ template <class Tree, class AnyHit>
                          " primitives; there is no primitive " + std::to_string(hit.prim));
     }
     const auto* const name = mesh_by_id(*inner, hit.geometry);
+    const std::string where = on_path(hit.instance);
     const std::string mesh = "mesh " + std::to_string(hit.geometry);
     if (name == nullptr) throw InputError(start + "the scene has no " + mesh + where);
     throw InputError(start + mesh + where + " has " + std::to_string(name->mesh.triangles.size()) +
                      " triangles; there is no triangle " + std::to_string(hit.prim));
 }
 
+/// Throws InputError that names the first hit without a triangle, if there is one.
 template <class Tree, class AnyHit>
 void check(const Tree& scene, std::span<const AnyHit> hits) {
     const std::size_t bad = first_index_where(hits.size(), [&](std::size_t i) {
@@ -177,8 +176,7 @@ struct CallByRays {
 template <class Tree, class AnyHit>
 void check_with_shapes(const Tree& scene, std::span<const AnyHit> hits, const CallByRays& call) {
     const auto is_refused = [&](const HitShape<Tree>& shape) {
-        return !call.takes_user_geometry &&
-               geometry_kind_of(shape.shapes->shapes) == GeometryKind::user;
+        return !call.takes_user_geometry && shape.shapes->user() != nullptr;
     };
     const std::size_t bad = first_index_where(hits.size(), [&](std::size_t i) {
         BasicHitTriangle<Tree> triangle;
@@ -189,9 +187,9 @@ void check_with_shapes(const Tree& scene, std::span<const AnyHit> hits, const Ca
     if (bad == hits.size()) return;
     HitShape<Tree> shape;
     if (find(scene, hits[bad], shape))
-        throw InputError(std::string(call.name) + ": hit " + std::to_string(bad) + ": geometry " +
-                         std::to_string(shape.shapes->id) +
-                         " is user geometry, whose normals its owner knows");
+        throw InputError(std::string(call.name) + ": hit " + std::to_string(bad) + ": " +
+                         name_of(*shape.shapes, hits[bad].instance) +
+                         " has no normals: only its owner knows them");
     refuse(scene, hits[bad], bad);
 }
 
@@ -284,6 +282,15 @@ Double3 normal_of(const HitShape<Tree>& hit, Double3 point) {
     return unit_of(normal);
 }
 
+template <class Tree, class AnyRay, class AnyHit>
+Double3 normal_of_hit(const Tree& scene, const AnyRay& ray, const AnyHit& hit) {
+    BasicHitTriangle<Tree> triangle;
+    if (find(scene, hit, triangle)) return triangle.normal();
+    HitShape<Tree> shape;
+    if (!find(scene, hit, shape) || shape.shapes->user() != nullptr) return {0, 0, 0};
+    return normal_of(shape, point_on(ray, hit.t));
+}
+
 template <class Scalar, class AnyHit, class Point>
 void fill_positions(const BasicScene<Scalar>& scene, std::span<const AnyHit> hits,
                     std::span<Point> points, int threads) {
@@ -330,16 +337,19 @@ std::uint32_t follow_path(const SceneTree& scene, std::uint32_t number,
     return triangle.levels;
 }
 
-bool find_triangle(const SceneTree& scene, const Hit& hit, HitTriangle& triangle) {
-    return find(scene, hit, triangle);
+Double3 normal_at(const SceneTree& scene, const Ray& ray, const Hit& hit) {
+    return normal_of_hit(scene, ray, hit);
 }
-bool find_triangle(const SceneTreeD& scene, const HitD& hit,
-                   BasicHitTriangle<SceneTreeD>& triangle) {
-    return find(scene, hit, triangle);
+Double3 normal_at(const SceneTreeD& scene, const RayD& ray, const HitD& hit) {
+    return normal_of_hit(scene, ray, hit);
 }
 
-void check_hits(const SceneTree& scene, std::span<const Hit> hits) { check(scene, hits); }
-void check_hits(const SceneTreeD& scene, std::span<const HitD> hits) { check(scene, hits); }
+void require_normals(const SceneTree& scene, std::span<const Hit> hits, const char* call) {
+    check_with_shapes(scene, hits, {call, false});
+}
+void require_normals(const SceneTreeD& scene, std::span<const HitD> hits, const char* call) {
+    check_with_shapes(scene, hits, {call, false});
+}
 
 template <class Tree>
 Double3 BasicHitTriangle<Tree>::point(double u, double v) const {

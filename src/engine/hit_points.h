@@ -1,4 +1,4 @@
-// Hits of a scene -> the triangles that they lie on, and their points and normals in the world.
+// Hits of a scene -> the triangles and shapes that they lie on, and their normals in the world.
 #pragma once
 
 #include <raydix/types.h>
@@ -34,13 +34,13 @@ using HitTriangle = BasicHitTriangle<SceneTree>;
 std::uint32_t follow_path(const SceneTree& scene, std::uint32_t number,
                           const InstanceName* (&way)[Scene::max_levels]);
 
-/// False: there is no such path, mesh or triangle. The hit is no miss.
-[[nodiscard]] bool find_triangle(const SceneTree& scene, const Hit& hit, HitTriangle& triangle);
-[[nodiscard]] bool find_triangle(const SceneTreeD& scene, const HitD& hit,
-                                 BasicHitTriangle<SceneTreeD>& triangle);
+/// The geometric normal where a ray hit a triangle or shape, of any length. 0: user geometry, a
+/// triangle without area, or a hit that the scene does not hold. The hit is no miss.
+[[nodiscard]] Double3 normal_at(const SceneTree& scene, const Ray& ray, const Hit& hit);
+[[nodiscard]] Double3 normal_at(const SceneTreeD& scene, const RayD& ray, const HitD& hit);
 
-/// Throws InputError that names the first hit without a triangle, if there is one.
-void check_hits(const SceneTree& scene, std::span<const Hit> hits);
-void check_hits(const SceneTreeD& scene, std::span<const HitD> hits);
+/// Throws InputError that names the first hit that is on no triangle and no shape, if there is one.
+void require_normals(const SceneTree& scene, std::span<const Hit> hits, const char* call);
+void require_normals(const SceneTreeD& scene, std::span<const HitD> hits, const char* call);
 
 }  // namespace raydix

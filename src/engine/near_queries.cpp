@@ -20,14 +20,15 @@ namespace raydix {
 namespace {
 
 /// Throws InputError for the first geometry, by path, that the mask shows and that has no answer.
-/// Each scene is looked at once, on however many paths it stands.
-void require_all_answers(const SceneTree& tree, std::uint32_t mask, NearCall call,
-                         std::unordered_set<const SceneTree*>& seen) {
+/// `path`: the one that leads to the tree. Each scene is looked at once, on however many paths it
+/// stands.
+void require_all_answers(const SceneTree& tree, std::uint32_t path, std::uint32_t mask,
+                         NearCall call, std::unordered_set<const SceneTree*>& seen) {
     for (const auto& shapes : tree.shapes)
-        if ((shapes->mask & mask) != 0 && !shapes->empty()) require_answers(*shapes, call);
+        if ((shapes->mask & mask) != 0 && !shapes->empty()) require_answers(*shapes, path, call);
     for (const InstanceName& instance : tree.instances)
         if ((instance.mask & mask) != 0 && seen.insert(instance.scene.get()).second)
-            require_all_answers(*instance.scene, mask, call, seen);
+            require_all_answers(*instance.scene, path + instance.number, mask, call, seen);
 }
 
 /// Throws InputError for geometry that has no answer.
@@ -38,7 +39,7 @@ const SceneTree& tree_for(const Scene& scene, std::uint32_t mask, NearCall call)
     const std::uint64_t asked = (static_cast<std::uint64_t>(call) + 1) << 32 | mask;
     if (near.has_answers.load(std::memory_order_relaxed) == asked) return tree;
     std::unordered_set<const SceneTree*> seen;
-    require_all_answers(tree, mask, call, seen);
+    require_all_answers(tree, 0, mask, call, seen);
     near.has_answers.store(asked, std::memory_order_relaxed);
     return tree;
 }

@@ -154,22 +154,22 @@ bool NearShapesD::find_closest(Vec3d query, Found& best, BasicWalkStack<double>&
 
 NearShapesPlan::NearShapesPlan(const SceneTreeD& scene, std::uint32_t mask, NearCall call)
     : scene_(scene), mask_(mask), call_(call) {
-    count(scene);
+    count(scene, 0);
 }
 
-auto NearShapesPlan::count(const SceneTreeD& scene) -> const Count& {
+auto NearShapesPlan::count(const SceneTreeD& scene, std::uint32_t path) -> const Count& {
     const auto known = counts_.find(&scene);
     if (known != counts_.end()) return known->second;
     Count sum;
     for (const auto& shapes : scene.shapes) {
         if ((shapes->mask & mask_) == 0 || shapes->empty()) continue;
-        require_answers(*shapes, call_);
+        require_answers(*shapes, path, call_);
         sum.primitives += shapes->part.size();
         ++sum.geometries;
     }
     for (const InstanceNameD& instance : scene.instances) {
         if ((instance.mask & mask_) == 0) continue;
-        const Count inner = count(*instance.scene);
+        const Count inner = count(*instance.scene, path + instance.number);
         sum.primitives = saturating_sum(sum.primitives, inner.primitives);
         sum.geometries = saturating_sum(sum.geometries, inner.geometries);
     }

@@ -49,7 +49,9 @@ public:
     [[nodiscard]] std::uint32_t max_depth() const { return tree_.max_depth(); }
     /// Throws InputError, which names a geometry.
     void require_answers(NearCall call) const {
-        if (!paths_.empty()) raydix::require_answers(*paths_.front().shapes, call);
+        if (paths_.empty()) return;
+        const ShapesOnPath& first = paths_.front();
+        raydix::require_answers(*first.shapes, first.number, call);
     }
 
     struct Found {
@@ -119,7 +121,8 @@ private:
     struct Count {
         std::uint64_t primitives = 0, geometries = 0;  // on all paths
     };
-    const Count& count(const SceneTreeD& scene);
+    /// `path`: the first that leads to the scene.
+    const Count& count(const SceneTreeD& scene, std::uint32_t path);
     struct Way;
     void walk(const SceneTreeD& scene, const Way& way, std::vector<ShapesOnPath>& out) const;
 

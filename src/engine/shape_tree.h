@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <string>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -80,6 +81,17 @@ struct ShapeGeometry {
         return std::get_if<BasicUserGeometry<Scalar>>(&shapes);
     }
 };
+
+/// " on path 2 of instances", as errors say where something is; nothing for path 0.
+[[nodiscard]] inline std::string on_path(std::uint32_t path) {
+    return path == 0 ? "" : " on path " + std::to_string(path) + " of instances";
+}
+/// "geometry 3 (spheres) on path 2 of instances".
+template <class Scalar>
+[[nodiscard]] std::string name_of(const ShapeGeometry<Scalar>& geometry, std::uint32_t path) {
+    return "geometry " + std::to_string(geometry.id) + " (" + kind_of(geometry.shapes) + ")" +
+           on_path(path);
+}
 
 /// A tree over the primitives of one geometry. `part` has their numbers.
 struct ShapeTree : PartTree, ShapeGeometry<float> {

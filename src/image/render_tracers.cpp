@@ -17,9 +17,12 @@ namespace {
 /// Making a wide tree takes about as long as tracing so many rays per triangle without it.
 constexpr std::uint64_t rays_per_triangle = 1;
 
-void fill_normals(const Surface& surface, std::span<const Hit> hits, std::span<Double3> normals) {
+/// `rays` and `hits`: in the surface's own space.
+template <class Surface, class Rays, class Hits>
+void fill_normals(const Surface& surface, const Rays& rays, const Hits& hits,
+                  std::span<Double3> normals) {
     for (std::size_t i = 0; i < hits.size(); ++i)
-        if (hits[i].hit()) normals[i] = surface.normal(hits[i]);
+        if (hits[i].hit()) normals[i] = surface.normal(rays[i], hits[i]);
 }
 
 }  // namespace
@@ -34,7 +37,7 @@ void BvhTracer::closest(std::span<const Ray> rays, std::span<Hit> hits,
         closest_on_this_thread(*wide_, rays, hits);
     else
         trace(bvh_, rays, hits);
-    fill_normals(surface_, hits, normals);
+    fill_normals(surface_, rays, hits, normals);
 }
 
 void BvhTracer::occluded(std::span<const Ray> rays, std::span<std::uint8_t> found) const {
@@ -57,7 +60,7 @@ SceneTracer::SceneTracer(const Scene& scene)
 void SceneTracer::closest(std::span<const Ray> rays, std::span<Hit> hits,
                           std::span<Double3> normals) const {
     closest_on_this_thread(*tree_, rays, hits);
-    fill_normals(surface_, hits, normals);
+    fill_normals(surface_, rays, hits, normals);
 }
 
 void SceneTracer::occluded(std::span<const Ray> rays, std::span<std::uint8_t> found) const {
@@ -74,7 +77,8 @@ SceneTracerD::SceneTracerD(const SceneD& scene)
 void SceneTracerD::closest(std::span<const Ray> rays, std::span<Hit> hits,
                            std::span<Double3> normals) const {
     std::vector<HitD> found(rays.size());
-    closest_on_this_thread(*tree_, in_space_around(middle(), rays), found);
+    const std::vector<RayD> placed = in_space_around(middle(), rays);
+    closest_on_this_thread(*tree_, placed, found);
     for (std::size_t i = 0; i < found.size(); ++i) {
         const HitD& hit = found[i];
         hits[i].t = static_cast<float>(hit.t);
@@ -84,7 +88,7 @@ void SceneTracerD::closest(std::span<const Ray> rays, std::span<Hit> hits,
         hits[i].geometry = hit.geometry;
         hits[i].instance = hit.instance;
     }
-    fill_normals(surface_, hits, normals);
+    fill_normals(surface_, placed, found, normals);
 }
 
 void SceneTracerD::occluded(std::span<const Ray> rays, std::span<std::uint8_t> found) const {

@@ -23,7 +23,8 @@ public:
     virtual ~Tracer() = default;
     /// Around all that rays may meet; lo > hi if there is nothing.
     [[nodiscard]] virtual Aabb bounds() const = 0;
-    /// normals [rays]: set for those that hit, as Surface::normal.
+    /// normals [rays]: set for those that hit. Geometric, of any length and on either side; 0 or
+    /// NaN where there is none.
     virtual void closest(std::span<const Ray> rays, std::span<Hit> hits,
                          std::span<Double3> normals) const = 0;
     virtual void occluded(std::span<const Ray> rays, std::span<std::uint8_t> found) const = 0;

@@ -45,9 +45,9 @@ void check_arguments(std::size_t rays, std::size_t hits, std::size_t pixels,
 
 /// point_of(i, step_back): the surface point of ray i, which hit.
 template <class AnyHit, class PointOf>
-std::vector<Ray> make_rays(const Surface& surface, std::span<const AnyHit> hits,
+std::vector<Ray> make_rays(const Aabb& bounds, std::span<const AnyHit> hits,
                            const SecondaryOptions& options, const PointOf& point_of) {
-    const double step_back = step_back_part * diagonal_of(surface.bounds());
+    const double step_back = step_back_part * diagonal_of(bounds);
     const std::vector<std::uint32_t> positions = positions_of_hits(hits);
     std::vector<SurfacePoint> points(positions.size());
     for_each_index(points.size(),
@@ -57,13 +57,13 @@ std::vector<Ray> make_rays(const Surface& surface, std::span<const AnyHit> hits,
     hemisphere.samples = static_cast<std::uint32_t>(options.samples);
     hemisphere.seed = options.seed;
     if (options.kind == RayKind::ao)
-        hemisphere.tmax = ao_radius_or_default(surface.bounds(), options.ao_radius);
+        hemisphere.tmax = ao_radius_or_default(bounds, options.ao_radius);
     std::vector<Ray> secondary(points.size() * hemisphere.samples);
     make_hemisphere_rays(points, hemisphere, secondary);
     if (options.kind == RayKind::diffuse_shuffled) {
         shuffle_rays(secondary, options.seed);
     } else if (options.sorted) {
-        sort_rays(secondary, far_of(surface.bounds()));
+        sort_rays(secondary, far_of(bounds));
     }
     return secondary;
 }
@@ -76,9 +76,11 @@ std::vector<Ray> make_float_rays(const AnySurface& surface, std::span<const Ray>
     std::vector<Ray> secondary;
     with_threads(options.threads, [&] {
         surface.check(hits);
-        secondary = make_rays(surface, hits, options, [&](std::uint32_t i, double step_back) {
-            return surface_point(surface.normal(hits[i]), rays[i], hits[i].t, pixels[i], step_back);
-        });
+        secondary =
+            make_rays(surface.bounds(), hits, options, [&](std::uint32_t i, double step_back) {
+                return surface_point(surface.normal(rays[i], hits[i]), rays[i], hits[i].t,
+                                     pixels[i], step_back);
+            });
     });
     return secondary;
 }
@@ -125,7 +127,7 @@ std::vector<RayD> make_secondary_rays(const SceneD& scene, std::span<const RayD>
     with_threads(options.threads, [&] {
         surface.check(hits);
         const std::vector<Ray> made =
-            make_rays(surface, hits, options, [&](std::uint32_t i, double step_back) {
+            make_rays(surface.bounds(), hits, options, [&](std::uint32_t i, double step_back) {
                 return surface.point(rays[i], hits[i], pixels[i], step_back);
             });
         secondary = in_space_around(surface.middle(), made);

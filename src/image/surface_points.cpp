@@ -13,10 +13,16 @@
 #include "exec/search.h"
 
 namespace raydix {
+namespace {
+
+/// The call that checks hits, as errors name it.
+constexpr const char* secondary_call = "make_secondary_rays";
+
+}  // namespace
 
 Aabb BvhSurface::bounds() const { return bvh_.empty() ? empty_box() : bvh_.bounds(); }
 
-Double3 BvhSurface::normal(const Hit& hit) const {
+Double3 BvhSurface::normal(const Ray&, const Hit& hit) const {
     const LeafTriangle& t = lookup_.triangle(hit.prim);
     return normal_of(t.v0, t.v1, t.v2);
 }
@@ -34,12 +40,13 @@ SceneSurface::SceneSurface(const Scene& scene) : tree_(SceneInternals::tree(scen
 
 Aabb SceneSurface::bounds() const { return tree_->bounds; }
 
-Double3 SceneSurface::normal(const Hit& hit) const {
-    HitTriangle triangle;
-    return find_triangle(*tree_, hit, triangle) ? triangle.normal() : Double3();
+Double3 SceneSurface::normal(const Ray& ray, const Hit& hit) const {
+    return normal_at(*tree_, ray, hit);
 }
 
-void SceneSurface::check(std::span<const Hit> hits) const { check_hits(*tree_, hits); }
+void SceneSurface::check(std::span<const Hit> hits) const {
+    require_normals(*tree_, hits, secondary_call);
+}
 
 SpaceAround space_around(const AabbD& box) {
     if (!(box.lo.x <= box.hi.x)) return {{}, empty_box()};
@@ -50,29 +57,20 @@ SpaceAround space_around(const AabbD& box) {
 SceneSurfaceD::SceneSurfaceD(const SceneD& scene)
     : tree_(SceneInternalsD::tree(scene)), space_(space_around(tree_->bounds)) {}
 
-Double3 SceneSurfaceD::normal_of(std::uint32_t prim, std::uint32_t geometry,
-                                 std::uint32_t instance) const {
-    HitD hit;
-    hit.prim = prim;
-    hit.geometry = geometry;
-    hit.instance = instance;
-    BasicHitTriangle<SceneTreeD> triangle;
-    return find_triangle(*tree_, hit, triangle) ? triangle.normal() : Double3();
+Double3 SceneSurfaceD::normal(const RayD& ray, const HitD& hit) const {
+    return normal_at(*tree_, ray, hit);
 }
 
-Double3 SceneSurfaceD::normal(const Hit& hit) const {
-    return normal_of(hit.prim, hit.geometry, hit.instance);
+void SceneSurfaceD::check(std::span<const HitD> hits) const {
+    require_normals(*tree_, hits, secondary_call);
 }
-
-void SceneSurfaceD::check(std::span<const HitD> hits) const { check_hits(*tree_, hits); }
 
 SurfacePoint SceneSurfaceD::point(const RayD& ray, const HitD& hit, std::uint32_t pixel,
                                   double step_back) const {
     const Double3 direction(ray.direction);
     const double t = hit.t - step_back / length(direction);
     const Double3 place = (Double3(ray.origin) - space_.middle) + direction * t;
-    const Double3 normal = normal_of(hit.prim, hit.geometry, hit.instance);
-    return {place.rounded(), turned_against(normal, direction).rounded(), pixel, 0};
+    return {place.rounded(), turned_against(normal(ray, hit), direction).rounded(), pixel, 0};
 }
 
 void require_triangles(const Bvh& bvh, std::string_view call) {

@@ -19,22 +19,14 @@
 
 namespace raydix {
 
-/// What was hit, as far as rays that start from its hits need to know.
-class Surface {
-public:
-    virtual ~Surface() = default;
-    /// Around all of it; lo > hi if there is nothing.
-    [[nodiscard]] virtual Aabb bounds() const = 0;
-    /// Geometric, in the world, of any length and on either side; 0 if there is none.
-    [[nodiscard]] virtual Double3 normal(const Hit& hit) const = 0;
-};
-
-/// The tree must outlive it.
-class BvhSurface final : public Surface {
+/// What was hit, as far as rays that start from its hits need to know. The tree must outlive it.
+class BvhSurface {
 public:
     explicit BvhSurface(const Bvh& bvh) : bvh_(bvh), lookup_(bvh) {}
-    [[nodiscard]] Aabb bounds() const override;
-    [[nodiscard]] Double3 normal(const Hit& hit) const override;
+    /// Around all of it; lo > hi if there is nothing.
+    [[nodiscard]] Aabb bounds() const;
+    /// Geometric, in the world, of any length and on either side; 0 or NaN if there is none.
+    [[nodiscard]] Double3 normal(const Ray& ray, const Hit& hit) const;
     /// Throws InputError that names the first hit that is not on this surface.
     void check(std::span<const Hit> hits) const;
 
@@ -43,13 +35,13 @@ private:
     PrimitiveLookup lookup_;
 };
 
-/// As the last commit left the scene. Throws InputError if there was none.
-class SceneSurface final : public Surface {
+/// As the last commit left the scene. Throws InputError if there was none. User geometry has no
+/// normal, and `check` refuses hits on it.
+class SceneSurface {
 public:
     explicit SceneSurface(const Scene& scene);
-    [[nodiscard]] Aabb bounds() const override;
-    [[nodiscard]] Double3 normal(const Hit& hit) const override;
-    /// As above.
+    [[nodiscard]] Aabb bounds() const;
+    [[nodiscard]] Double3 normal(const Ray& ray, const Hit& hit) const;
     void check(std::span<const Hit> hits) const;
 
 private:
@@ -64,24 +56,22 @@ struct SpaceAround {
 [[nodiscard]] SpaceAround space_around(const AabbD& box);
 
 /// A scene in double in the space of its pictures, whose origin is the middle of the scene's box:
-/// there floats are fine enough for all that is drawn. Otherwise as above.
-class SceneSurfaceD final : public Surface {
+/// there floats are fine enough for all that is drawn. Rays and hits are in the scene's own space.
+/// Otherwise as above.
+class SceneSurfaceD {
 public:
     explicit SceneSurfaceD(const SceneD& scene);
-    [[nodiscard]] Aabb bounds() const override { return space_.bounds; }
-    [[nodiscard]] Double3 normal(const Hit& hit) const override;
+    [[nodiscard]] Aabb bounds() const { return space_.bounds; }
+    [[nodiscard]] Double3 normal(const RayD& ray, const HitD& hit) const;
     void check(std::span<const HitD> hits) const;
 
     /// The origin of that space in the scene's.
     [[nodiscard]] Double3 middle() const { return space_.middle; }
-    /// surface_point for a ray and a hit in the scene's own space.
+    /// As surface_point.
     [[nodiscard]] SurfacePoint point(const RayD& ray, const HitD& hit, std::uint32_t pixel,
                                      double step_back) const;
 
 private:
-    [[nodiscard]] Double3 normal_of(std::uint32_t prim, std::uint32_t geometry,
-                                    std::uint32_t instance) const;
-
     std::shared_ptr<const SceneTreeD> tree_;
     SpaceAround space_;
 };

@@ -21,7 +21,7 @@ struct DistributedSceneInternals {
     [[nodiscard]] static const Communicator& communicator(const DistributedOf& scene);
     /// Around what all ranks hold; lo > hi if that is nothing.
     [[nodiscard]] static Box bounds(const DistributedOf& scene);
-    /// Collective. Closest hits. normals [rays]: set for those that hit, as Surface::normal.
+    /// Collective. Closest hits. normals [rays]: set for those that hit, as Tracer::closest.
     [[nodiscard]] static std::vector<Hit> trace(const DistributedOf& scene,
                                                 std::span<const Ray> rays,
                                                 std::span<Double3> normals);

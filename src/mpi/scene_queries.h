@@ -175,14 +175,9 @@ public:
     /// normals [rays of this rank]: set where a ray hits.
     HitNormals(const BasicScene<T>& scene, std::span<Double3> normals)
         : surface_(scene), normals_(normals) {}
-    /// Of a hit of this rank's part.
-    template <class AnyHit>
-    [[nodiscard]] Double3 of(const AnyHit& hit) const {
-        Hit named;
-        named.prim = hit.prim;
-        named.geometry = hit.geometry;
-        named.instance = hit.instance;
-        return surface_.normal(named);
+    /// Where a ray hit this rank's part.
+    [[nodiscard]] Double3 of(const BasicRay<T>& ray, const BasicHit<T>& hit) const {
+        return surface_.normal(ray, hit);
     }
     void set(std::size_t i, const Double3& normal) { normals_[i] = normal; }
 
@@ -222,6 +217,10 @@ public:
         found_.resize(questions.size());
         raydix::trace(this->parts_.scene, arrived.rays(), std::span(found_),
                       this->options_of(arrived));
+        if (normals_ == nullptr) return;
+        normals_found_.resize(found_.size());
+        for (std::size_t q = 0; q < found_.size(); ++q)
+            if (found_[q].hit()) normals_found_[q] = normals_->of(arrived.rays()[q], found_[q]);
     }
     [[nodiscard]] std::uint64_t most_answer_bytes() const {
         return sizeof(std::uint8_t) + sizeof(Hit) + (normals_ != nullptr ? sizeof(Double3) : 0);
@@ -236,7 +235,7 @@ public:
         put(out, hit.geometry);
         put(out, hit.instance);
         put(out, hit.prim);
-        if (normals_ != nullptr) put(out, normals_->of(found_[q]));
+        if (normals_ != nullptr) put(out, normals_found_[q]);
     }
     void take(std::size_t i, Reader& reader) {
         if (reader.take<std::uint8_t>() == 0) return;
@@ -264,7 +263,8 @@ private:
     }
     Answers<Hit, TraceCounts>& answers_;
     HitNormals<T>* normals_;
-    std::vector<BasicHit<T>> found_;  // of answers
+    std::vector<BasicHit<T>> found_;      // of answers
+    std::vector<Double3> normals_found_;  // [found_], set where a ray hit
 };
 
 /// Any hit: one rank that says yes is enough.

@@ -65,7 +65,7 @@ TEST_F(Refusals, ResultsStayAsTheyWere) {
     const std::vector<raydix_hit> hits{good, of_user, good};
     std::vector<float> results(9, 42);
     expect_refused(raydix_hit_normals(scene, rays.data(), hits.data(), 3, results.data(), 0),
-                   "normals: hit 1: geometry 1 is user geometry");
+                   "normals: hit 1: geometry 1 (user geometry) has no normals");
     EXPECT_EQ(results, std::vector<float>(9, 42));
     EXPECT_EQ(raydix_hit_positions(scene, rays.data(), hits.data(), 3, results.data(), 0),
               RAYDIX_OK);

@@ -446,15 +446,16 @@ TEST(DoubleNear, ErrorsNameTheGeometry) {
     scene.add(inner, moved(0, 0, 0));
     scene.commit();
     const std::string users =
-        "closest points: geometry 9 (user geometry) has no distances: it is known by its hits "
-        "alone";
+        "closest points: geometry 9 (user geometry) on path 1 of instances has no distances: it is "
+        "known by its hits alone";
     for (int round = 0; round < 2; ++round) {
         EXPECT_EQ(message_of([&] { static_cast<void>(closest_point(scene, {0, 0, 0})); }), users);
         EXPECT_TRUE(closest_point(scene, {0, 0, 5}, infinity, 3).found());
         EXPECT_EQ(message_of([&] {
                       static_cast<void>(sweep_sphere(scene, {down, 1}, 3));
                   }),
-                  "sweeps: geometry 7 (spheres) cannot be swept against: only triangles can");
+                  "sweeps: geometry 7 (spheres) on path 1 of instances cannot be swept against: "
+                  "only triangles can");
         EXPECT_TRUE(sweep_sphere(scene, {down, 1}, 1).hit());
     }
     // All triangles as one body: shapes are none.

@@ -172,7 +172,7 @@ TEST(NearShapes, WhatHasNoAnswerIsNamed) {
     const SphereSweep sweep{{{0, 0, 9}, 0, {0, 0, -1}}, 1};
     EXPECT_NE(message_of([&] {
                   static_cast<void>(sweep_sphere(scene, sweep));
-              }).find("geometry 3 (spheres)"),
+              }).find("geometry 3 (spheres) on path 1 of instances"),
               std::string::npos);
     EXPECT_TRUE(sweep_sphere(scene, sweep, 1).hit());  // does not see them
     EXPECT_EQ(closest_point(scene, {1, 0, 5}).geometry, 3u);
@@ -186,7 +186,9 @@ TEST(NearShapes, WhatHasNoAnswerIsNamed) {
                                        message_of([&] {
                                            static_cast<void>(touches(scene, Sphere{{0, 0, 0}, 1}));
                                        })})
-        EXPECT_NE(message.find("geometry 8 (user geometry)"), std::string::npos) << message;
+        EXPECT_NE(message.find("geometry 8 (user geometry) on path 1 of instances"),
+                  std::string::npos)
+            << message;
     EXPECT_EQ(closest_point(scene, {1, 0, 5}, infinity, 1).geometry, 0u);
 }
 
@@ -243,7 +245,8 @@ TEST(NearShapes, TheFirstGeometryIsNamed) {
     outer.add(scene, {});
     outer.commit();
     EXPECT_EQ(named(outer),
-              "sweeps: geometry 9 (spheres) cannot be swept against: only triangles can");
+              "sweeps: geometry 9 (spheres) on path 1 of instances cannot be swept against: only "
+              "triangles can");
 }
 
 }  // namespace

@@ -89,6 +89,28 @@ TYPED_TEST(PicturesOverRanks, AreThoseOfOneProcess) {
     }
 }
 
+/// Normals of shapes need the rays, which are on another rank.
+TYPED_TEST(PicturesOverRanks, OfSpheresAreThoseOfOneProcess) {
+    using T = TypeParam;
+    const T away = sizeof(T) == 4 ? T(100) : T(1e7);
+    const std::vector<BasicSphere<T>> spheres{{{away + T(1), 1, 2}, 1}, {{away + T(3), 1, 2}, 1}};
+    BasicScene<T> one;
+    std::vector<BasicDistributedGeometry<T>> own(spheres.size());
+    for (std::size_t i = 0; i < spheres.size(); ++i) {
+        const auto part = std::span(spheres).subspan(i, 1);
+        one.add(part);
+        if (rank() == static_cast<int>(i) % ranks()) own[i].spheres = part;
+    }
+    one.commit();
+    const BasicDistributedScene<T> many(MPI_COMM_WORLD,
+                                        std::span<const BasicDistributedGeometry<T>>(own));
+    for (const View view : {View::normal, View::shaded}) {
+        const RenderOptions options = small_picture(view);
+        EXPECT_TRUE(same_picture(render(many, camera_at<T>(away), options),
+                                 raydix::render(one, camera_at<T>(away), options)));
+    }
+}
+
 TEST(PicturesOverRanks, OfNothingAreThoseOfOneProcess) {
     const Scene one{Mesh()};
     const DistributedScene many(MPI_COMM_WORLD, std::span<const MeshView>());

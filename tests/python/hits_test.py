@@ -259,3 +259,19 @@ def test_hits_of_triangles_that_are_gone():
     gone = "uv: triangle .* was hit, and its mesh has 1 by the last commit"
     with pytest.raises(raydix.InputError, match=gone):
         scene.interpolate(hits, "uv")
+
+
+@precisions
+@pytest.mark.parametrize("name", ["prim", "geometry", "instance"])
+def test_numbers_that_are_no_ids(precision, name):
+    """They are refused, not wrapped around."""
+    scene = raydix.Scene(*BOX, precision=precision)
+    rays = np.array([[0.5, 0.25, 9, 0, 0, -1]])
+    hits = dict(scene.intersect(rays))
+    np.testing.assert_array_equal(scene.normals({**hits, name: hits[name].astype(np.int64)}), [[0, 0, 1]])
+    for wrong, error in ((2**32, ValueError), (-(2**32), ValueError), (-1, ValueError), (0.0, TypeError)):
+        for call in (scene.positions, scene.normals):
+            with pytest.raises(error, match=f"hits, {name}: expected"):
+                call({**hits, name: np.array([wrong])})
+            with pytest.raises(error, match=f"hits, {name}: expected"):
+                call({**hits, name: np.array([wrong])}, rays)

@@ -248,3 +248,78 @@ def test_copies_of_stand_ins_are_their_own(made):
     TriangleMesh(embree, *BOX)
     TriangleMesh(made(embree), *BOX)
     assert len(embree._scene) == 1
+
+
+def strict_scenes(precision):
+    """One that goes over as its arrays, one as bytes."""
+    options = dict(strict=True, builder="apetrei", max_leaf=9, bits=30, precision=precision)
+    mesh, world = raydix.Scene(*BOX, **options), raydix.Scene(**options)
+    world.add(*BOX, id=3)
+    for scene in (mesh, world):
+        scene.commit(usage="moving", refit_limit=0.5)
+    return mesh, world
+
+
+@copies
+@precisions
+def test_options_go_along(made, precision):
+    moved = BOX[0] * [1, 2, 3]
+    for scene in strict_scenes(precision):
+        other = made(made(scene))
+        assert other.options == scene.options and other.stats() == {**scene.stats(), "ms": other.stats()["ms"]}
+        with pytest.raises(raydix.InputError, match="not finite"):
+            other.add([[np.nan, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+        ball = other.add_spheres([[0, 0, 0]], -1)
+        with pytest.raises(raydix.InputError, match=f"geometry {ball}: sphere 0"):
+            other.commit()
+        other.remove(ball)
+        id = next(iter(other))
+        other.update(id, moved)
+        assert other.commit()["trees_built"] == 1  # refit_limit is below 1
+        assert other.commit(refit_limit=2)["trees_built"] == 0
+
+
+class NamedScene(raydix.Scene):
+    def __init__(self, title):
+        super().__init__(*BOX)
+        self.title = title
+        self.itself = self
+
+
+class NamedPoints(raydix.Points):
+    def __init__(self, title, **options):
+        super().__init__(np.eye(3), **options)
+        self.title = title
+
+
+@copies
+def test_subclasses_and_attributes(made, tmp_path):
+    scene = NamedScene("a box")
+    placed = NamedScene("two boxes")
+    placed.add(*BOX)
+    placed.commit()
+    for thing in (scene, placed):
+        other = made(thing)
+        assert type(other) is NamedScene and other.title == thing.title
+        assert list(other) == list(thing) and other.intersect(RAYS) == thing.intersect(RAYS)
+    for strict in (False, True):
+        points = NamedPoints("three", strict=strict)
+        points.remove(1)
+        other = made(points)
+        assert type(other) is NamedPoints and other.title == "three"
+        assert other.knn([0, 1, 0], 2)["indices"].tolist() == points.knn([0, 1, 0], 2)["indices"].tolist()
+    scene.save(tmp_path / "box.rdx")
+    mapped = raydix.load_scene(tmp_path / "box.rdx")
+    mapped.note = [1, 2]
+    assert made(mapped).note == [1, 2] and type(made(mapped)) is raydix.Scene
+
+
+@precisions
+def test_pickles_of_before(precision):
+    """Without a class, without a limit of refits."""
+    scene = mixed_world(precision)
+    for whole in (scene, raydix.Scene(*BOX, precision=precision)):
+        make, (what, more), _ = whole.__reduce_ex__(4)
+        less = {name: value for name, value in more.items() if name not in ("type", "refit_limit")}
+        other = make(what, less)
+        assert type(other) is raydix.Scene and other.intersect(RAYS) == whole.intersect(RAYS)

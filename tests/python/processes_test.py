@@ -136,6 +136,9 @@ ENDLESS = {
     "commit": "r = np.random.default_rng(1); world = raydix.Scene(); "
     "n = 1_500_000; world.add(r.random((n, 3)), r.integers(0, n, (n, 3))); "
     "world.commit(quality='high', threads=1)",
+    "slow queries": "r = np.random.default_rng(1); "  # the first 2^20 would take minutes
+    "soup = raydix.Scene(r.random((5000, 3)), r.integers(0, 5000, (5000, 3)), threads=1); "
+    "soup.winding_number(np.full((1 << 20, 3), 0.5), rule='winding')",
     "simulator": "[raydix.simulate(scene, rays) for _ in range(100)]",
 }
 

@@ -290,3 +290,63 @@ def test_one_mesh_has_its_id(rng):
         assert near["geometry"].tolist() == [5, raydix.MISSING] and near["instance"].tolist() == [0, 0]
         touched = scene.touched_by(spheres=[[0, 0, 0, 9]])
         assert touched["geometry"].tolist() == [5] * 30 and len(scene.overlaps()[0]) == 2
+
+
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+def test_masks(precision):
+    """What a mask does not show is not there: a box at 0, one at 10, a ball at 20."""
+    box, scene = raydix.Scene(*BOX, precision=precision), raydix.Scene(precision=precision)
+    scene.add(*BOX, mask=1)
+    scene.add(box, transform_by(10), mask=2)
+    scene.add_spheres([[20.5, 0.5, 0.5]], 0.5, mask=4)
+    scene.commit()
+    lo, hi = BOX[0].min(axis=0), BOX[0].max(axis=0)
+    middle, size = (lo + hi) / 2, (hi - lo)[0]
+    inside = np.array([middle, middle + [10, 0, 0]])
+    for mask, wanted in ((1, [1, 0]), (2, [0, 1]), (3, [1, 1]), (8, [0, 0])):
+        wanted = np.array(wanted, bool)
+        assert (scene.contains(inside, mask=mask) == wanted).all()
+        assert (scene.contains(inside, mask=mask, rule="parity") == wanted).all()
+        assert (np.round(scene.winding_number(inside, mask=mask)) == wanted).all()
+        assert ((scene.signed_distance(inside, mask=mask) < 0) == wanted).all()
+        balls = np.column_stack([inside, [size, size]])
+        assert (scene.touches(spheres=balls, mask=mask) == wanted).all()
+        touched = np.diff(scene.touched_by(spheres=balls, mask=mask)["offsets"].astype(int))
+        assert ((touched > 0) == wanted).all()
+        swept = scene.sweep_spheres(inside + [0, 0, 50], [[0, 0, -1.0]] * 2, radii=0.1, mask=mask)
+        assert (np.isfinite(swept["t"]) == wanted).all()
+        near = scene.closest_point(inside, mask=mask, max_distance=size)
+        assert ((near["prim"] != raydix.MISSING) == wanted).all()
+    assert scene.closest_point([20.5, 0.5, 0.5])["geometry"] == 2
+    assert scene.closest_point([20.5, 0.5, 0.5], mask=3)["instance"] == 1
+    with pytest.raises(raydix.InputError, match="sweeps: geometry 2 .spheres. cannot"):
+        scene.sweep_spheres(inside, [[0, 0, -1.0]] * 2, radii=1)
+    with pytest.raises(raydix.InputError, match="contains: .*geometry 2 .spheres."):
+        scene.contains(inside)
+
+
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+def test_masks_of_overlaps_and_of_one_mesh(precision):
+    scene = raydix.Scene(precision=precision)
+    scene.add(*BOX, mask=6)
+    scene.commit()
+    other = raydix.Scene(*BOX, precision=precision)
+    assert len(scene.overlaps(other)) == len(scene.overlaps(other, mask=2)) > 12
+    assert scene.overlaps(other, mask=1).shape == (0, 2)
+    assert scene.count_overlaps(other, mask=1) == scene.count_overlaps(mask=8) == 0
+    assert scene.count_overlaps(other, mask=4) == len(scene.overlaps(other))
+    middle = (BOX[0].min(axis=0) + BOX[0].max(axis=0)) / 2
+    assert scene.contains(middle, mask=2) and not scene.contains(middle, mask=1)
+    assert scene.contains(middle) and scene.closest_point(middle, mask=9)["prim"] == raydix.MISSING
+    two = raydix.Scene(precision=precision)
+    two.add(*BOX, mask=1)
+    two.add(*BOX, mask=2)
+    two.commit()
+    both = two.overlaps()
+    assert set(both["geometry"].ravel().tolist()) == {0, 1}
+    assert set(two.overlaps(mask=2)["geometry"].ravel().tolist()) <= {1}
+    assert two.count_overlaps(mask=2) == len(two.overlaps(mask=2)["prim"]) < len(both["prim"])
+
+
+def transform_by(x):
+    return [[1, 0, 0, x], [0, 1, 0, 0], [0, 0, 1, 0]]

@@ -198,8 +198,79 @@ def test_filters_name_what_is_wrong():
         mesh.intersect(rays, skip=[1, 2, 3])
     with pytest.raises(TypeError, match="keep: expected bool"):
         mesh.intersect(rays, keep=np.zeros(len(mesh.faces)))
-    with pytest.raises(raydix.InputError, match="keep: geometry 0 has primitive"):
-        mesh.intersect(rays, keep=np.ones(1, bool))
     double = raydix.Scene(mesh.vertices, mesh.faces, precision="float64")
-    with pytest.raises(raydix.InputError, match="keep: geometry 0 has primitive"):
-        double.intersect(rays, keep=np.ones(1, bool))
+    n = len(mesh.faces)
+    nowhere = np.array([[0, 0, 1e6, 0, 0, 1]], float)
+    for scene in (mesh, double):
+        for given in (0, 1, n - 1, n + 1, 2 * n):
+            for call in (scene.intersect, scene.occluded, scene.count, scene.all_hits):
+                text = f"keep: geometry 0 has {n} primitives, but its array has {given} values"
+                with pytest.raises(raydix.InputError, match=text):
+                    call(nowhere, keep=np.ones(given, bool))
+                with pytest.raises(raydix.InputError, match="keep"):
+                    call(rays[:0], keep=np.ones(given, bool))
+
+
+def test_lengths_of_filters_are_those_of_each_geometry():
+    """Whatever rays hit. What is not there is passed over."""
+    leaf, world = raydix.Scene(), raydix.Scene()
+    leaf.add_spheres([[0, 0, 0], [3, 0, 0]], 1)
+    leaf.commit()
+    world.add_points([[0, 0, 9]], 1)
+    world.add(leaf, np.eye(4))
+    world.add(np.zeros((0, 3)), np.zeros((0, 3), int))
+    world.commit()
+    down = np.array([[0, 0, 20, 0, 0, -1.0]])
+    assert world.intersect(down, keep={0: [False]}).instance.item() == 1
+    assert world.intersect(down, keep={5: [False], (9, 0): np.zeros(0, bool), (1, 7): [True] * 3}).t.item() == 10
+    assert world.intersect(down, keep={0: [False], (1, 0): [False, True]}).t.item() == np.inf
+    for place, count in ((0, 1), ((1, 0), 2)):
+        for wrong in (count - 1, count + 1):
+            with pytest.raises(raydix.InputError, match=f"has {count} primitives, but .* {wrong} v"):
+                world.intersect(down, keep={place: np.ones(wrong, bool)})
+
+
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+def test_strict_scenes_refuse_shapes(precision):
+    scene = raydix.Scene(strict=True, precision=precision)
+    ball = scene.add_spheres([[0, 0, 0], [np.nan, 0, 0]], 1)
+    with pytest.raises(raydix.InputError, match="geometry 0: sphere 1: not finite"):
+        scene.commit()
+    scene.update_spheres(ball, [[0, 0, 0]], -1)
+    with pytest.raises(raydix.InputError, match="geometry 0: sphere 0"):
+        scene.commit(quality="fast")
+    scene.update_spheres(ball, [[0, 0, 0]], 1)
+    assert scene.commit()["left_out"] == 0
+    for add in (
+        lambda: scene.add_capsules([[0, 0, 0]], [[np.inf, 0, 0]], 1),
+        lambda: scene.add_points([[2e12, 0, 0]], 1),
+    ):
+        id = add()
+        with pytest.raises(raydix.InputError, match=f"geometry {id}: "):
+            scene.commit()
+        scene.remove(id)
+    assert scene.commit()["shapes"] == 1
+
+
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+def test_shapes_are_drawn_and_sampled(precision):
+    """Two balls, one in an instance, from straight above."""
+    leaf, world = raydix.Scene(precision=precision), raydix.Scene(precision=precision)
+    leaf.add_spheres([[0, 0, 0]], 1)
+    leaf.commit()
+    world.add_spheres([[-2, 0, 0]], 1)
+    world.add(leaf, [[1, 0, 0, 2], [0, 1, 0, 0], [0, 0, 1, 0]])
+    world.commit()
+    camera = raydix.Camera(position=(0, 0, 9), target=(0, 0, 0), up=(0, 1, 0))
+    picture = world.render(camera, view="normal", size=(64, 48)).reshape(-1, 3)
+    seen = world.primary_rays(camera, size=(64, 48))
+    rays = seen["rays"]
+    hits = world.intersect(rays)
+    normals = world.normals(hits, rays)[hits.hit]
+    np.testing.assert_allclose(
+        picture[seen["pixels"][hits.hit]], 0.5 + 0.5 * normals, atol=2e-3 if precision == "float64" else 1e-5
+    )
+    assert set(hits.instance[hits.hit].tolist()) == {0, 1}
+    secondary = world.secondary_rays(rays, samples=3)
+    assert len(secondary) == 3 * hits.hit.sum() > 100
+    assert not world.occluded(secondary).all()

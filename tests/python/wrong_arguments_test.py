@@ -230,6 +230,17 @@ def test_what_the_messages_say():
         (lambda: raydix.octree(V).boxes([0.7]), TypeError, "nodes: expected whole numbers"),
         (lambda: raydix.octree(V).boxes([np.nan]), TypeError, "nodes: expected whole numbers"),
         (lambda: raydix.octree(V).boxes([-1]), ValueError, "nodes: expected 0 to 4294967295"),
+        (lambda: scene.intersect(RAYS, mask=np.float32(2**32)), ValueError, "mask: expected a whole"),
+        (lambda: scene.closest_point([0, 0, 0], mask=-1), ValueError, "mask: expected a whole number"),
+        (lambda: scene.contains([0, 0, 0], mask="x"), TypeError, "mask: expected a whole number"),
+        (lambda: raydix.to_png(np.zeros((2, 0, 3))), raydix.InputError,
+         "picture: expected at least one pixel, given shape (2, 0, 3)"),
+        (lambda: scene.intersect(np.ma.masked_array(RAYS, RAYS == 5)), raydix.InputError,
+         "rays: expected no masked values, given 1"),
+        (lambda: raydix.Points(np.ma.masked_invalid([[0, 0, np.nan]])), raydix.InputError,
+         "points: expected no masked values, given 1"),
+        (lambda: raydix.machine(1), TypeError, "machine() takes 0 positional arguments"),
+        (lambda: raydix.scenes("x"), TypeError, "scenes() takes 0 positional arguments"),
     ):  # fmt: skip
         with pytest.raises(error) as raised:
             call()
@@ -247,3 +258,11 @@ def test_numbers_that_are_large_and_arrays_that_are_not_plain():
         scene = raydix.Scene(V, F)
         assert scene.intersect(matrix) == scene.intersect(RAYS)
         assert scene.count(matrix).tolist() == scene.count(RAYS).tolist()
+        assert scene.intersect(np.ma.masked_array(RAYS)) == scene.intersect(RAYS)  # none is masked
+        beyond = np.array([[1e300, 0, -1e300]])
+        for found in (
+            scene.sweep_spheres(ORIGIN, beyond, radii=1),
+            scene.sweep_spheres(ORIGIN, DOWN, radii=1e300),
+            scene.sweep_spheres(ORIGIN, DOWN, radii=1, tmin=1e300),
+        ):
+            assert found["t"].tolist() == [np.inf]
