@@ -35,7 +35,8 @@ void add_points_suite(CLI::App& bench) {
 void add_mpi_command(CLI::App& app) {
     add_other_program(
         app, "mpi", "Scenes and points spread over the ranks of mpirun",
-        {"mpi", "raydix_mpi", "with RAYDIX_MPI where CMake finds MPI (Debian: libopenmpi-dev)"});
+        {"mpi", "raydix_mpi", "with RAYDIX_MPI where CMake finds MPI (Debian: libopenmpi-dev)",
+         "--help-all"});
 }
 
 }  // namespace raydix::cli

@@ -391,8 +391,16 @@ void add_traversal_suite(CLI::App& bench) {
     options->tree.builder = "split";
     options->tree.max_leaf = 8;
     add_tree_options(*command, options->tree);
+    offer_binary_tree(*command, options->tree, "cpu|cuda|opencl[:N]|hip[:N]");
     add_tree_figure_options(*command, options->tree);
     add_common_options(*command, options->common);
+    command->get_option("--builder")
+        ->description(
+            "Builder (default, without --quality: sbvh for gtx480 and gtx680, else split)");
+    command->get_option("--quality")
+        ->description(
+            "Picks a builder and its rounds of reinsertion: fast is apetrei, balanced is ploc and "
+            "2, high is sbvh and 4 (default: none, but the builder of each machine)");
     command->callback([options, command] {
         options->tree_of_machine = command->get_option("--builder")->count() == 0 &&
                                    command->get_option("--quality")->count() == 0;

@@ -192,6 +192,9 @@ void run_check(const CheckCommand& options) {
     CheckReport report;
     std::string what = options.scene;
     if (compares) {
+        for (const std::string& file : options.same)
+            if (is_scene_file(file))
+                throw InputError(file + ": it holds a scene, and --same compares trees");
         const SceneTree a = load_scene_tree(options.same[0], options.tree, options.common);
         const SceneTree b = load_scene_tree(options.same[1], options.tree, options.common);
         report = check_same(a.bvh, b.bvh);

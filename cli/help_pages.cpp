@@ -276,6 +276,13 @@ void append_roff(const OptionWords& option, std::string& page) {
     if (!option.usual.empty()) page += fmt::format(".br\nWithout it: {}\n", roff(option.usual));
 }
 
+/// Text as it is, line by line.
+void append_lines(const std::string& text, std::string& page) {
+    page += ".nf\n";
+    for (const std::string& line : CLI::detail::split(text, '\n')) page += roff(line) + "\n";
+    page += ".fi\n";
+}
+
 /// "raydix-bench-traversal"
 std::string page_name(const CLI::App& command) {
     std::string path = path_of(command);
@@ -313,6 +320,12 @@ std::string man_page(CLI::App& command) {
                             roff(first.head == "Options" ? "OPTIONS" : "OPTIONS: " + first.head));
         for (const OptionWords& option : options)
             if (option.head == first.head) append_roff(option, page);
+    }
+    // Of a program beside this one, which alone knows its options.
+    const std::string other = command.get_footer();  // with a line's end of its own
+    if (other.size() > 1) {
+        page += ".SH OPTIONS\n";
+        append_lines(other, page);
     }
     page +=
         ".SH EXIT STATUS\n0: done. 1: the input or the machine is at fault; one line on standard "

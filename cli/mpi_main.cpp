@@ -44,6 +44,7 @@ int run(int argc, char** argv) {
     }
     CLI::App app("Scenes and points spread over the ranks of mpirun.", "raydix mpi");
     app.set_version_flag("--version", std::string("raydix ") + raydix::version);
+    app.set_help_all_flag("--help-all", "Print this message with the options of all commands");
     app.require_subcommand(1);
     add_mpi_info(app);
     add_mpi_trace(app);

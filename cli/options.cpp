@@ -135,6 +135,23 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
         options.of_a_bvh.push_back(command.get_option(name));
 }
 
+void offer_binary_tree(CLI::App& command, TreeOptions& options, const std::string& devices) {
+    const auto offer = [&](const char* name, const char* what, const std::string& values) {
+        CLI::Option* option = command.get_option(name);
+        option->description(what);
+        option->get_validator(0)->description(values);
+    };
+    offer("--tree", "Kind of tree", "{bvh}");
+    offer("--layout", "Memory layout that is traced (default: binary)", "{binary}");
+    if (devices.empty())
+        offer("--device", "Where to build and trace", "{cpu}");
+    else
+        offer("--device", "Where rays are also traced and timed (cpu: nowhere)", devices);
+    CLI::Option* of_octrees = command.get_option("--max-level");
+    std::erase(options.of_the_build, of_octrees);
+    command.remove_option(of_octrees);
+}
+
 void add_tree_figure_options(CLI::App& command, TreeOptions& options) {
     command.add_option("--sah-node", options.sah.node, "SAH cost of an inner node")
         ->check(finite_number(true))

@@ -23,6 +23,14 @@ Camera PictureOptions::chosen_camera(const Model& scene) const {
     if (!target.empty()) chosen.target = vec_of(target);
     if (!up.empty()) chosen.up = vec_of(up);
     if (fov) chosen.vfov = *fov;
+    // Errors name the camera: those of what the options changed must not be looked for in a file.
+    const std::pair<bool, const char*> changes[] = {{!eye.empty(), " --eye"},
+                                                    {!target.empty(), " --target"},
+                                                    {!up.empty(), " --up"},
+                                                    {fov.has_value(), " --fov"}};
+    if (moves_camera()) chosen.name += " with";
+    for (const auto& [changed, option] : changes)
+        if (changed) chosen.name += option;
     return chosen;
 }
 

@@ -107,8 +107,9 @@ void run_report(const ReportCommand& options) {
     const std::string html = make_report(input);
     save_report(options.out_file, html);
     if (options.common.prints_tables())
-        fmt::print("{} ({} documents, {} pictures, {} kB)\n", options.out_file,
-                   input.documents.size(), input.pictures.size(),
+        fmt::print("{} ({}, {}, {} kB)\n", options.out_file,
+                   counted(input.documents.size(), "document", "documents"),
+                   counted(input.pictures.size(), "picture", "pictures"),
                    grouped((html.size() + 999) / 1000));
 }
 

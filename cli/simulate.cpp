@@ -126,6 +126,7 @@ void add_simulate_command(CLI::App& app) {
     options->tree.builder = "split";
     options->tree.max_leaf = 8;
     add_tree_options(*command, options->tree);
+    offer_binary_tree(*command, options->tree);
     add_tree_figure_options(*command, options->tree);
     add_flatten_option(*command, options->common);
     add_common_options(*command, options->common);

@@ -59,14 +59,16 @@ public:
             const raydix::Ray& ray = rays.ray(k);
             double t[2];
             if (!roots(q, ray, t)) continue;
-            for (const double at : t)
-                if (at >= std::max(ray.tmin, 0.0f) && at <= ray.tmax &&
+            for (const double at : t) {
+                const float rounded = static_cast<float>(at);  // before it meets tmin and tmax
+                if (rounded >= std::max(ray.tmin, 0.0f) && rounded <= ray.tmax &&
                     is_inside(q.box, ray.origin.x + at * ray.direction.x,
                               ray.origin.y + at * ray.direction.y,
                               ray.origin.z + at * ray.direction.z)) {
-                    rays.hit(k, static_cast<float>(at));
+                    rays.hit(k, rounded);
                     break;
                 }
+            }
         }
     }
 
@@ -130,6 +132,10 @@ int main() {
             rays.push_back({.origin = {-8 + 0.1f * static_cast<float>(x), -15,
                                        -3 + 0.05f * static_cast<float>(y)},
                             .direction = {0, 1, 0.01f}});
+    raydix::Scene equal;  // of equal hits the first geometry's counts
+    add_quadrics(equal, quadrics);
+    add_quadrics(equal, quadrics);
+    equal.commit();
     std::size_t hits = 0, differences = 0;
     for (const raydix::SimdPath path : {raydix::SimdPath::automatic, raydix::SimdPath::single,
                                         raydix::SimdPath::packet, raydix::SimdPath::stream}) {
@@ -140,6 +146,8 @@ int main() {
             differences += found[i].t != alone.t || found[i].prim != alone.prim ||
                            found[i].instance != alone.instance;
         }
+        for (const raydix::Hit& hit : raydix::trace(equal, rays, {.path = path}))
+            differences += hit.hit() && hit.geometry != 0;
     }
     std::printf("%zu hits of %zu rays by four ways, %zu differences\n", hits, 4 * rays.size(),
                 differences);

@@ -147,8 +147,9 @@ RAYDIX_C_API raydix_status raydix_scene_add_points(raydix_scene* scene, const fl
                                                    uint32_t* id);
 /* Where a ray hits a primitive of the caller's own: sets t, u and v of `hit` and returns 1, or
    returns 0. The ray is in the geometry's own space. t outside [tmin, tmax] is no hit; tmax is the
-   best hit so far. Comes from several threads at once and in any order; the answer may depend on
-   the arguments alone. It may trace and query, and must return. */
+   best hit so far. Round t to the type of the ray before it is compared with them: else which of
+   equal hits counts depends on the path. Comes from several threads at once and in any order; the
+   answer may depend on the arguments alone. It may trace and query, and must return. */
 typedef int (*raydix_user_test)(void* user, uint32_t prim, const raydix_ray* ray, raydix_hit* hit);
 /* Primitives that `test` intersects. boxes [6 * count]: low and high corner of the box around each.
    `user` must stay valid as long as a scene holds the geometry. */

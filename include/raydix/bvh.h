@@ -17,9 +17,10 @@
 namespace raydix {
 
 /// How the tree is built. `karras`, `lauterbach`, `garanzha` and `apetrei` give the same tree, bit
-/// for bit, in little time. The others give better trees for more time: `ploc` and `hploc` merge
-/// clusters by surface area, `binned` splits by it, and `sweep` looks at every split. `split` cuts
-/// large triangles into parts before the build and `sbvh` during it, so that one triangle may be in
+/// for bit. `karras` and `apetrei` take the least time; `lauterbach` is the slowest of the four and
+/// is kept for study. The others give better trees for more time: `ploc` and `hploc` merge clusters
+/// by surface area, `binned` splits by it, and `sweep` looks at every split. `split` cuts large
+/// triangles into parts before the build and `sbvh` during it, so that one triangle may be in
 /// several leaves. Over boxes and points `split` and `sbvh` are `sweep`.
 enum class Builder : std::uint32_t {
     karras = 0,

@@ -164,8 +164,11 @@ struct KdQueryCounts {
 /// Finds the k nearest points of each query, ordered by (d2, id), where d2 = (dx*dx + dy*dy) +
 /// dz*dz in float32 without FMA (docs/contract.md 8). queries [n] -> neighbors [n * k]. Where there
 /// are fewer points, a row ends with missing ones. A distance whose square overflows is infinite,
-/// but the point is found. Throws InputError: sizes that do not fit, k = 0, a tree of triangles.
-/// The form that returns a vector throws ResultTooLarge before it makes room for too much.
+/// but the point is found. The tree has one Morton grid over the whole box: where an outlier or
+/// clusters far denser than the rest crowd many points into few cells, a query looks at most of
+/// them. Take `build_points` (points.h) for such clouds. Throws InputError: sizes that do not fit,
+/// k = 0, a tree of triangles. The form that returns a vector throws ResultTooLarge before it makes
+/// room for too much.
 KdQueryCounts kd_nearest(const KdTree& tree, std::span<const Vec3> queries, std::uint32_t k,
                          std::span<KdNeighbor> neighbors, const KdQueryOptions& options = {});
 [[nodiscard]] std::vector<KdNeighbor> kd_nearest(const KdTree& tree, std::span<const Vec3> queries,

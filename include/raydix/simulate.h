@@ -124,7 +124,8 @@ struct MachineModel {
     std::uint32_t l2_bytes = 1u << 20;
     std::uint32_t texture_bytes = 0;       // of a texture cache, in lines of 32; 0: there is none
     std::uint32_t texture_sharers = 1;     // multiprocessors of one texture cache
-    double texture_fetches_per_clock = 0;  // of 16 bytes a lane, of one multiprocessor
+    double texture_fetches_per_clock = 0;  // of 16 bytes a lane, of one multiprocessor; above 0
+                                           // where there is a texture cache
     bool nodes_by_texture = true;          // where there are textures; triangles always are
     // Until a value is there, by what holds it.
     double texture_clocks = 0, l1_clocks = 0, l2_clocks = 0, dram_clocks = 0;

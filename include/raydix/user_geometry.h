@@ -77,6 +77,10 @@ public:
     /// to 2^-41 of that and 2^-44 of the box's largest coordinate. Else it may be missed. In double
     /// the function gets one ray at a time.
     ///
+    /// A t that is computed in a wider type must be rounded to Scalar before it is compared with
+    /// tmin and tmax. Else a t that rounds to tmax is refused, and which of equal hits counts
+    /// depends on the path (SimdPath).
+    ///
     /// Calls come from several threads at once and in any order. A ray that may hit a primitive is
     /// asked about once or several times; some rays that miss it are not asked about. Answers must
     /// depend on `prim` and the ray alone. The function may itself trace and query. What it throws

@@ -3,9 +3,6 @@
 
 #include "exec/parallel.h"
 
-#if __has_include(<pthread.h>)
-#include <pthread.h>
-#endif
 #include <raydix/thread_pool.h>
 #include <tbb/blocked_range.h>
 #include <tbb/global_control.h>
@@ -14,33 +11,18 @@
 #include <tbb/task_group.h>
 
 #include <algorithm>
-#include <atomic>
 #include <utility>
 
 #include "base/float_env.h"
 #include "base/options.h"
 #include "exec/job_loop.h"
 #include "exec/progress.h"
+#include "exec/workers.h"
 
 namespace raydix {
 namespace {
 
 thread_local bool inside_range = false;
-
-// A forked child has none of oneTBB's workers, and finds its locks as other threads held them.
-std::atomic<bool> onetbb_was_used{false}, workers_are_gone{false};
-#if __has_include(<pthread.h>)
-[[maybe_unused]] const int at_fork = pthread_atfork(nullptr, nullptr, [] {
-    if (onetbb_was_used) workers_are_gone = true;
-});
-#endif
-
-/// Whether loops may go to oneTBB, which counts as used from then on.
-bool onetbb_serves() {
-    if (workers_are_gone) return false;
-    onetbb_was_used = true;
-    return true;
-}
 
 /// A range that this thread runs.
 class Range {
@@ -77,7 +59,7 @@ void with_threads(int threads, const std::function<void()>& body) {
         with_job_limit(threads, body);
         return;
     }
-    if (threads == 0 || !onetbb_serves()) {
+    if (threads == 0 || !workers_serve()) {
         run_here(body);
         return;
     }
@@ -102,7 +84,7 @@ void with_threads(int threads, const std::function<void()>& body) {
 void isolated(const std::function<void()>& body) {
     if (pool_is_used())
         as_job(body);  // a pool may run any of its tasks while a loop waits
-    else if (!onetbb_serves())
+    else if (!workers_serve())
         body();
     else
         tbb::this_task_arena::isolate(body);
@@ -111,7 +93,7 @@ void isolated(const std::function<void()>& body) {
 int thread_count() {
     if (detail::loops_stay) return 1;
     if (pool_is_used()) return pool_threads();
-    return onetbb_serves() ? tbb::this_task_arena::max_concurrency() : 1;
+    return workers_serve() ? tbb::this_task_arena::max_concurrency() : 1;
 }
 
 bool has_onetbb() { return true; }

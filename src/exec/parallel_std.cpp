@@ -6,6 +6,7 @@
 #include <raydix/thread_pool.h>
 
 #include <algorithm>
+#include <memory>
 #include <thread>
 
 #include "base/float_env.h"
@@ -13,6 +14,7 @@
 #include "exec/crew.h"
 #include "exec/job_loop.h"
 #include "exec/parallel.h"
+#include "exec/workers.h"
 
 namespace raydix {
 namespace {
@@ -25,6 +27,21 @@ int machine_threads() {
 /// Each calling thread has a crew of its own. More than the machine has are only there so that
 /// tests see more of them meet.
 int most_threads() { return std::max(16, machine_threads()); }
+
+/// The calling thread's crew. In a forked child it has no threads to wait for, and is left.
+class OwnCrew {
+public:
+    OwnCrew() = default;
+    ~OwnCrew() {
+        if (workers_are_gone()) static_cast<void>(crew_.release());
+    }
+    OwnCrew(const OwnCrew&) = delete;
+    OwnCrew& operator=(const OwnCrew&) = delete;
+    Crew* operator->() const { return crew_.get(); }
+
+private:
+    std::unique_ptr<Crew> crew_ = std::make_unique<Crew>();
+};
 
 }  // namespace
 
@@ -39,7 +56,8 @@ void with_threads(int threads, const std::function<void()>& body) {
 
 int thread_count() {
     if (detail::loops_stay) return 1;
-    return pool_is_used() ? pool_threads() : jobs_at_once(machine_threads(), most_threads());
+    if (pool_is_used()) return pool_threads();
+    return workers_serve() ? jobs_at_once(machine_threads(), most_threads()) : 1;
 }
 
 void isolated(const std::function<void()>& body) {
@@ -67,8 +85,8 @@ void parallel_ranges(std::size_t n, std::size_t grain,
         return;
     }
     JobLoop loop(n, grain, threads, call, body);
-    thread_local Crew crew;
-    crew.run(threads - 1, [&loop] { loop.work(); });
+    thread_local OwnCrew crew;
+    crew->run(threads - 1, [&loop] { loop.work(); });
     loop.rethrow();
 }
 

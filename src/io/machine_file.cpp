@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "base/printable.h"
 #include "scene/byte_source.h"
 #include "scene/json_input.h"
 #include "simt/op.h"
@@ -77,7 +78,10 @@ private:
     }
     std::string text(const json& value, const char* key) const {
         if (!value.is_string()) in_.fail(key, "not a text");
-        return value.get<std::string>();
+        std::string given = value.get<std::string>();
+        if (given.empty()) in_.fail(key, "empty");
+        if (printable(std::string_view(given)) != given) in_.fail(key, "has control characters");
+        return given;
     }
     const json* find(const char* key) {
         known_.emplace_back(key);
@@ -90,7 +94,7 @@ private:
         const json* found = find(key);
         if (found == nullptr) return;
         const double given = found->is_number() ? found->get<double>() : -1.0;
-        if (!(given > 0 && given <= 1e15)) in_.fail(key, "not a number above 0 and at most 1e15");
+        if (!(given >= 1e-6 && given <= 1e15)) in_.fail(key, "not a number from 1e-6 to 1e15");
         value = given;
     }
     /// A field that may be left out, base or not.

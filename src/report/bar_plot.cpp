@@ -134,7 +134,8 @@ private:
             svg_.open(bar.label + "\n" + plot_.mark_name + ": " + significant(bar.mark) + " " +
                       plot_.unit + origin_suffix(plot_.origin));
             svg_.rect(x(bar.mark) - 5, from - 4, 10, bar_height + 8, "hit");
-            svg_.line(x(bar.mark), from - 4, x(bar.mark), from + bar_height + 4, "mark-line");
+            // From the bar's upper edge: the label stands over it.
+            svg_.line(x(bar.mark), from, x(bar.mark), from + bar_height + 4, "mark-line");
             svg_.close();
             end = std::max(end, x(bar.mark) + 2);
         }

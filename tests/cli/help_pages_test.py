@@ -1,5 +1,6 @@
 """Completion in shells and manual pages know every command and option that --help knows."""
 import os
+import pathlib
 import re
 import shutil
 import subprocess
@@ -89,6 +90,26 @@ class HelpPages(ProgramTest):
                                       check=True)
                 self.assertEqual(done.stderr, "", words)
                 self.assertIn(" ".join(["raydix", *words]), re.sub(r".\x08|\x1b\[[0-9;]*m", "", done.stdout))
+
+    def test_manual_pages_of_programs_beside(self):
+        for words, program in ((["bench", "cpu"], "bench_cpu"), (["bench", "points"], "bench_points"), (["mpi"], "raydix_mpi")):
+            page = self.succeed("man", *words).out.replace("\\-", "-")
+            if not (pathlib.Path(PROGRAM).parent / program).exists():
+                self.assertNotIn(".SH OPTIONS", page)
+                continue
+            known = options_in(self.succeed(*words, "--help").out)
+            known |= {"--knn"} if words == ["mpi"] else {"--rounds"}
+            for option in known:
+                self.assertIn(option, page, words)
+
+    def test_help_offers_no_tree_that_is_refused(self):
+        for words in (["simulate"], ["bench", "traversal"]):
+            text = self.succeed(*words, "--help").out
+            self.assertNotIn("octree", text, words)
+            self.assertNotIn("wide8", text, words)
+            self.assertNotIn("|sim", text, words)
+        self.assertRegex(text, r"Builder \(default.*sbvh for gtx480")
+        self.assertEqual(self.complete("raydix", "simulate", "x.ply", "--tree", ""), {"bvh"})
 
     def test_all_pages_into_a_folder(self):
         (self.folder / "pages").mkdir()

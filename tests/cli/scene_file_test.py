@@ -74,9 +74,10 @@ class SceneFile(ProgramTest):
 
     def test_what_is_refused(self):
         self.succeed("build", self.scene, "--repeat", "1", "-o", "saved.rdx")
-        for command in (("build", "saved.rdx"), ("query", "saved.rdx", "--knn", "2"), ("simulate", "saved.rdx", "--size", "8x8"),
-                        ("check", "--same", "saved.rdx", SOUP)):
+        for command in (("build", "saved.rdx"), ("query", "saved.rdx", "--knn", "2"), ("simulate", "saved.rdx", "--size", "8x8")):
             self.fail_with_one_line(*command, names=("saved.rdx", "it holds a scene", "info, check, trace, render and query --closest"))
+        for same in (("saved.rdx", SOUP), (SOUP, "saved.rdx")):
+            self.fail_with_one_line("check", "--same", *same, names=("saved.rdx", "--same compares trees"))
         self.fail_with_usage("render", "saved.rdx", "--view", "tree", "-o", "x.png", names=("saved.rdx", "--view: tree"))
         for options in (("--flatten",), ("--builder", "ploc"), ("--strict",)):
             self.fail_with_usage("query", "saved.rdx", "--closest", *options, names=("saved.rdx", options[0]))

@@ -172,6 +172,12 @@ class Simulate(ProgramTest):
                             ('{"base": "gtx480", "clock": 2}', ["clock", "not a field"]),
                             ('{"base": "gtx480", "clock_ghz": -1}', ["clock_ghz"]),
                             ('{"base": "gtx480", "clock_ghz": "fast"}', ["clock_ghz"]),
+                            ('{"base": "gtx480", "clock_ghz": 1e-308}', ["clock_ghz", "1e-6"]),
+                            ('{"base": "gtx480", "name": ""}', ["name", "empty"]),
+                            ('{"base": "gtx480", "name": "a\\u001b[31mb"}', ["name", "control characters"]),
+                            ('{"base": "gtx480", "origin": "a\\nb"}', ["origin", "control characters"]),
+                            ('{"base": "gtx480", "costs": {"a\\u001b[31m": 1}}', ["costs"]),
+                            ('{"base": "gtx480", "a\\u001b[31m": 1}', ["not a field"]),
                             ('{"base": "gtx480", "read_clocks": -1}', ["read_clocks"]),
                             ('{"base": "gtx480", "replays": 1}', ["replays", "true or false"]),
                             ('{"base": "gtx480", "l2_clocks": "long"}', ["l2_clocks"]),
@@ -201,6 +207,10 @@ class Simulate(ProgramTest):
             file = self.write("cannot.json", text)
             self.fail_with_one_line("simulate", SCENE, "--machine", file, names=["cannot.json", *words])
             self.fail_with_one_line("bench", "traversal", SCENE, "--machine", f"gtx285,{file}", names=["cannot.json", *words])
+        # A cache that gives nothing is no texture cache.
+        file = self.write("texture.json", '{"base": "gtx480", "texture_fetches_per_clock": 0}')
+        self.fail_with_one_line("simulate", SCENE, "--memory", "--machine", file,
+                                names=["texture.json", "texture_fetches_per_clock is 0;", "1e-6"])
         # 15 first-level caches of 4 GB would be 32 GB of records.
         file = self.write("caches.json", '{"base": "gtx480", "l1_bytes": 4000000000}')
         self.fail_with_one_line("simulate", SCENE, "--memory", "--machine", file, names=["caches.json", "l1_bytes", "2^30"])

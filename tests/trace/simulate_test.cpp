@@ -585,6 +585,14 @@ TEST(Simulate, RefusesWhatItCannotRun) {
     refuse_memory("l2_clocks", [](MachineModel& m) { m.l2_clocks = -infinity; });
     refuse_memory("texture_fetches_per_clock",
                   [](MachineModel& m) { m.texture_fetches_per_clock = -1; });
+    refuse_memory("texture_fetches_per_clock is 0; it must be from 1e-6", [](MachineModel& m) {
+        m.texture_bytes = 4096;
+        m.texture_fetches_per_clock = 0;
+    });
+    refuse("clock_ghz is 1e-308; it must be from 1e-6 to 1e15",
+           [](SimulateOptions& o) { o.machine.clock_ghz = 1e-308; });
+    refuse("multiprocessors is 0; it must be above 0",
+           [](SimulateOptions& o) { o.machine.multiprocessors = 0; });
     refuse("two costs", [](SimulateOptions& o) { o.machine.costs.push_back(o.machine.costs[0]); });
     refuse("no operation", [](SimulateOptions& o) { o.machine.costs[0].operation = "jump"; });
     EXPECT_THROW(static_cast<void>(machine_model("gtx1")), InputError);

@@ -1,4 +1,5 @@
 // Public calls of the warp simulator: trees in the kernels' form, launches, rates.
+#include <fmt/format.h>
 #include <raydix/cwbvh.h>
 #include <raydix/error.h>
 #include <raydix/simulate.h>
@@ -86,19 +87,22 @@ void check_options(const SimulateOptions& options) {
     if (options.width < 1 || options.width > 128 || (options.width & (options.width - 1)) != 0)
         throw InputError("width is " + std::to_string(options.width) +
                          "; it must be 1, 2, 4, 8, 16, 32, 64 or 128");
-    const auto positive = [&](const char* field, double value) {
-        if (!(value > 0) || value > 1e15)
-            throw InputError("machine " + m.name + ": " + field + " is " + std::to_string(value) +
-                             "; it must be above 0 and at most 1e15");
+    const auto refuse = [&](const char* field, auto value, const char* bounds) {
+        throw InputError(
+            fmt::format("machine {}: {} is {}; it must be {}", m.name, field, value, bounds));
+    };
+    const auto positive = [&](const char* field, std::uint32_t value) {
+        if (value == 0) refuse(field, value, "above 0");
+    };
+    const auto rate = [&](const char* field, double value) {
+        if (!(value >= 1e-6 && value <= 1e15)) refuse(field, value, "from 1e-6 to 1e15");
     };
     positive("multiprocessors", m.multiprocessors);
-    positive("clock_ghz", m.clock_ghz);
-    positive("lanes_per_clock", m.lanes_per_clock);
-    positive("warp_issue_clocks", m.warp_issue_clocks);
+    rate("clock_ghz", m.clock_ghz);
+    rate("lanes_per_clock", m.lanes_per_clock);
+    rate("warp_issue_clocks", m.warp_issue_clocks);
     const auto not_negative = [&](const char* field, double value) {
-        if (!(value >= 0) || value > 1e9)
-            throw InputError("machine " + m.name + ": " + field + " is " + std::to_string(value) +
-                             "; it must be from 0 to 1e9");
+        if (!(value >= 0 && value <= 1e9)) refuse(field, value, "from 0 to 1e9");
     };
     not_negative("read_clocks", m.read_clocks);
     not_negative("stack_read_clocks", m.stack_read_clocks);
@@ -112,9 +116,9 @@ void check_options(const SimulateOptions& options) {
     if (double(m.resident_lanes) * m.multiprocessors > 1 << 24)
         throw InputError("machine " + m.name + ": more than 2^24 lanes in flight");
     if (!options.memory) return;
-    positive("l1_transactions_per_clock", m.l1_transactions_per_clock);
-    positive("l2_gb_per_s", m.l2_gb_per_s);
-    positive("dram_gb_per_s", m.dram_gb_per_s);
+    rate("l1_transactions_per_clock", m.l1_transactions_per_clock);
+    rate("l2_gb_per_s", m.l2_gb_per_s);
+    rate("dram_gb_per_s", m.dram_gb_per_s);
     positive("l1_line_bytes", m.l1_line_bytes);
     if (m.l1_line_bytes % 32 != 0 || m.l1_line_bytes > largest_line_bytes)
         throw InputError(
@@ -125,7 +129,10 @@ void check_options(const SimulateOptions& options) {
     not_negative("l1_clocks", m.l1_clocks);
     not_negative("l2_clocks", m.l2_clocks);
     not_negative("dram_clocks", m.dram_clocks);
-    if (m.texture_bytes > 0) positive("texture_sharers", m.texture_sharers);
+    if (m.texture_bytes > 0) {
+        positive("texture_sharers", m.texture_sharers);
+        rate("texture_fetches_per_clock", m.texture_fetches_per_clock);
+    }
     positive("l2_bytes", m.l2_bytes);
     // The model keeps a record for each 32 bytes of cache.
     if ((double(m.l1_bytes) + m.texture_bytes) * m.multiprocessors + m.l2_bytes > 1 << 30)
