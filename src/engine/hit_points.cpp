@@ -371,6 +371,10 @@ Double3 BasicHitTriangle<Tree>::normal() const {
 template struct BasicHitTriangle<SceneTree>;
 template struct BasicHitTriangle<SceneTreeD>;
 
+bool find_triangle(const SceneTree& scene, const Hit& hit, HitTriangle& triangle) {
+    return find(scene, hit, triangle);
+}
+
 void positions(const Scene& scene, std::span<const Hit> hits, std::span<Vec3> points, int threads) {
     fill_positions(scene, hits, points, threads);
 }

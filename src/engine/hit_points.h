@@ -34,6 +34,9 @@ using HitTriangle = BasicHitTriangle<SceneTree>;
 std::uint32_t follow_path(const SceneTree& scene, std::uint32_t number,
                           const InstanceName* (&way)[Scene::max_levels]);
 
+/// False: there is no such path, mesh or triangle. The hit is no miss.
+[[nodiscard]] bool find_triangle(const SceneTree& scene, const Hit& hit, HitTriangle& triangle);
+
 /// The geometric normal where a ray hit a triangle or shape, of any length. 0: user geometry, a
 /// triangle without area, or a hit that the scene does not hold. The hit is no miss.
 [[nodiscard]] Double3 normal_at(const SceneTree& scene, const Ray& ray, const Hit& hit);
