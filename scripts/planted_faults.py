@@ -395,7 +395,7 @@ FAULTS = [
     Fault("src/engine/scene.cpp", "state.in_a_row.clear();", "", "scenes: what is added after a commit is not committed", "engine"),
     Fault("src/engine/scene.cpp", "for (const auto& shapes : tree->shapes) at(shapes->id).changed = false;", "",
           "scenes: each commit builds all shapes again", "engine"),
-    Fault("src/engine/scene_trace_double.cpp", "hits == nullptr ? nullptr : hits + first,", "hits,",
+    Fault("src/engine/scene_batch.h", "hits == nullptr ? nullptr : hits + first,", "hits,",
           "scenes in double: hits of a part of a batch are written over those of its beginning", "engine"),
     Fault("src/scene/model_nodes.h", "return std::isnormal(rounded) ? rounded : value;", "return value;",
           "flattened models: transforms are not those of instances", "engine"),

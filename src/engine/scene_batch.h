@@ -6,6 +6,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,34 @@ inline TraceCounts sum_of(const std::vector<JobCounts>& parts, std::size_t rays)
     for (const JobCounts& part : parts) sum.hits += part.hits, sum.invalid_rays += part.invalid;
     return sum;
 }
+
+/// Rays and where their answers go: hits, or else occluded.
+template <class Scalar>
+struct BasicSceneBatch {
+    using Hit = BasicHit<Scalar>;
+
+    std::span<const BasicRay<Scalar>> rays;
+    Hit* hits;
+    std::uint8_t* occluded;
+    const BasicSceneTraceOptions<Scalar>& options;
+
+    [[nodiscard]] std::uint32_t mask(std::size_t i) const {
+        return options.masks.empty() ? options.mask : options.masks[i];
+    }
+    /// Null: all hits count.
+    [[nodiscard]] const auto* filter() const { return options.filter ? &options.filter : nullptr; }
+    void set(std::size_t i, const Hit& hit) const {
+        if (hits != nullptr)
+            hits[i] = hit;
+        else
+            occluded[i] = hit.hit();
+    }
+    /// Rays first to last - 1, of a batch without masks, or all.
+    [[nodiscard]] BasicSceneBatch part(std::size_t first, std::size_t last) const {
+        return {rays.subspan(first, last - first), hits == nullptr ? nullptr : hits + first,
+                occluded == nullptr ? nullptr : occluded + first, options};
+    }
+};
 
 /// Throws InputError: an option out of range, masks for another number of rays.
 template <class Scalar>

@@ -27,28 +27,7 @@
 namespace raydix {
 namespace {
 
-/// Rays and where their answers go: hits, or else occluded.
-struct Batch {
-    std::span<const Ray> rays;
-    Hit* hits;
-    std::uint8_t* occluded;
-    const SceneTraceOptions& options;
-
-    [[nodiscard]] std::uint32_t mask(std::size_t i) const {
-        return options.masks.empty() ? options.mask : options.masks[i];
-    }
-    void set(std::size_t i, const Hit& hit) const {
-        if (hits != nullptr)
-            hits[i] = hit;
-        else
-            occluded[i] = hit.hit();
-    }
-};
-
-/// Null: all hits count.
-const HitFilter* filter_of(const SceneTraceOptions& options) {
-    return options.filter ? &options.filter : nullptr;
-}
+using Batch = BasicSceneBatch<float>;
 
 struct Kernels {
     const SimdKernels* tree;
@@ -69,7 +48,7 @@ JobCounts trace_job(const SceneTree& tree, const Kernels& kernels, PathWay way, 
     job.first = from;
     job.mask = batch.options.mask;
     job.masks = batch.options.masks.empty() ? nullptr : batch.options.masks.data() + from;
-    job.filter = filter_of(batch.options);
+    job.filter = batch.filter();
     job.any = batch.hits == nullptr;
     job.packets = way == PathWay::packets;
     job.single = way == PathWay::turns || way == PathWay::alone;
@@ -166,7 +145,7 @@ std::uint64_t find_all(const SceneTree& tree, const Kernels& kernels, PathWay wa
     job.first = begin;
     job.mask = batch.options.mask;
     job.masks = batch.options.masks.empty() ? nullptr : batch.options.masks.data() + begin;
-    job.filter = filter_of(batch.options);
+    job.filter = batch.filter();
     job.packets = way == PathWay::packets;
     job.single = way == PathWay::alone;
     job.turns = false;
@@ -265,8 +244,7 @@ TraceCounts trace_few(const SceneTree& tree, const Batch& batch) {
     check_threads(batch.options.threads);
     const SceneKernels& kernels = scene_kernels_for(batch.options.isa);
     const FloatEnvironment plain;
-    OneOfParts one{batch.hits == nullptr ? kernels.any : kernels.closest, tree, 0,
-                   filter_of(batch.options)};
+    OneOfParts one{batch.hits == nullptr ? kernels.any : kernels.closest, tree, 0, batch.filter()};
     TraceCounts counts;
     counts.rays = batch.rays.size();
     for (; one.place < batch.rays.size(); ++one.place) {

@@ -27,33 +27,7 @@
 namespace raydix {
 namespace {
 
-/// Rays and where their answers go: hits, or else occluded.
-struct Batch {
-    std::span<const RayD> rays;
-    HitD* hits;
-    std::uint8_t* occluded;
-    const SceneTraceOptionsD& options;
-
-    [[nodiscard]] std::uint32_t mask(std::size_t i) const {
-        return options.masks.empty() ? options.mask : options.masks[i];
-    }
-    void set(std::size_t i, const HitD& hit) const {
-        if (hits != nullptr)
-            hits[i] = hit;
-        else
-            occluded[i] = hit.hit();
-    }
-    /// Rays first to last - 1, of a batch without masks, or all.
-    [[nodiscard]] Batch part(std::size_t first, std::size_t last) const {
-        return {rays.subspan(first, last - first), hits == nullptr ? nullptr : hits + first,
-                occluded == nullptr ? nullptr : occluded + first, options};
-    }
-};
-
-/// Null: all hits count.
-const HitFilterD* filter_of(const SceneTraceOptionsD& options) {
-    return options.filter ? &options.filter : nullptr;
-}
+using Batch = BasicSceneBatch<double>;
 
 const SceneTreeD& checked_tree(const SceneD& scene, std::size_t rays,
                                const SceneTraceOptionsD& options) {
@@ -71,7 +45,7 @@ void set_job(SceneJobD& job, const SceneTreeD& tree, const Batch& batch,
     job.rays = batch.rays.data() + from;
     job.order = order.empty() ? nullptr : order.data() + begin;
     job.first = from;
-    job.filter = filter_of(batch.options);
+    job.filter = batch.filter();
     job.n = end - begin;
     job.mask = batch.options.mask;
     job.masks = batch.options.masks.empty() ? nullptr : batch.options.masks.data() + from;
@@ -171,7 +145,7 @@ TraceCounts trace_few(const SceneTreeD& tree, const Batch& batch) {
     const SceneKernelsD& kernels = scene_kernels_double_for(batch.options.isa);
     SceneKernelsD::OneRayOfScene* const kernel =
         batch.hits == nullptr ? kernels.any : kernels.closest;
-    const HitFilterD* const filter = filter_of(batch.options);
+    const HitFilterD* const filter = batch.filter();
     const ThreadOwn<SceneJobD> own;
     own->stack.reserve_words(tree.stack_size);
     const FloatEnvironment plain;

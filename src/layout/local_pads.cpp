@@ -8,6 +8,7 @@
 
 #include "base/math.h"
 #include "layout/about_middle.h"
+#include "layout/child_words.h"
 #include "tree/median_center.h"
 
 namespace raydix {
@@ -20,13 +21,13 @@ constexpr float pad_a_side = 20 * 0x1p-24f;
 constexpr double much_larger = 32;
 constexpr std::size_t nodes_to_look_at = 256;
 
-bool is_leaf(std::uint32_t word) { return word != wide_no_child && (word & wide_leaf_bit) != 0; }
+using namespace child_words;
 
 /// Calls take(block, lane) for the triangles of a leaf.
 template <class Block, class Take>
 void for_each_triangle(const Buffer<Block>& blocks, std::uint32_t word, const Take& take) {
-    const std::uint32_t place = (word & ~wide_leaf_bit) >> 3, count = (word & 7) + 1;
-    for (std::uint32_t k = place; k < place + count; ++k)
+    const std::uint32_t place = first_place(word);
+    for (std::uint32_t k = place; k < place + leaf_size(word); ++k)
         take(blocks[k / block_lanes], k % block_lanes);
 }
 

@@ -10,16 +10,14 @@
 #include "base/same_bits.h"
 #include "exec/search.h"
 #include "layout/about_middle.h"
+#include "layout/child_words.h"
 #include "primitives/sources.h"
 #include "primitives/zero_area.h"
 
 namespace raydix {
 namespace {
 
-bool is_leaf(std::uint32_t word) { return word != wide_no_child && (word & wide_leaf_bit) != 0; }
-bool is_inner(std::uint32_t word) { return word != wide_no_child && (word & wide_leaf_bit) == 0; }
-std::uint32_t first_place(std::uint32_t word) { return (word & ~wide_leaf_bit) >> 3; }
-std::uint32_t leaf_size(std::uint32_t word) { return (word & 7) + 1; }
+using namespace child_words;
 
 std::string node_name(std::size_t w) { return "nodes: node " + std::to_string(w); }
 

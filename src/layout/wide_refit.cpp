@@ -14,6 +14,7 @@
 #include "exec/large_pages.h"
 #include "exec/parallel.h"
 #include "layout/about_middle.h"
+#include "layout/child_words.h"
 #include "layout/leaf_order.h"
 #include "layout/local_pads.h"
 #include "primitives/bounds.h"
@@ -23,10 +24,7 @@
 namespace raydix {
 namespace {
 
-bool is_leaf(std::uint32_t word) { return word != wide_no_child && (word & wide_leaf_bit) != 0; }
-bool is_inner(std::uint32_t word) { return word != wide_no_child && (word & wide_leaf_bit) == 0; }
-std::uint32_t leaf_place(std::uint32_t word) { return (word & ~wide_leaf_bit) >> 3; }
-std::uint32_t leaf_count(std::uint32_t word) { return (word & 7) + 1; }
+using namespace child_words;
 
 /// What SAH is made of: half areas of nodes, and of leaves times their triangles by slot.
 struct Areas {
@@ -58,7 +56,7 @@ struct Areas {
         const double x = double(boxes.hi[0][s]) - boxes.lo[0][s],
                      y = double(boxes.hi[1][s]) - boxes.lo[1][s],
                      z = double(boxes.hi[2][s]) - boxes.lo[2][s];
-        const double area = (x * y + y * z + z * x) * static_cast<std::int32_t>(leaf_count(word));
+        const double area = (x * y + y * z + z * x) * static_cast<std::int32_t>(leaf_size(word));
         areas.leaves[s] += is_leaf(word) ? area : 0.0;
         boxes.used |= (word != wide_no_child ? 1u : 0u) << s;
     }
@@ -389,8 +387,8 @@ bool WideRefitter::look_at_leaves(const WideBvh::Arrays& tree) {
         for (std::size_t s = 0; s < quantised_width; ++s) {
             const std::uint32_t word = tree.nodes[w].child[s];
             if (!is_leaf(word)) continue;
-            const std::uint32_t place = leaf_place(word);
-            for (std::uint32_t p = place; p < place + leaf_count(word); ++p) {
+            const std::uint32_t place = first_place(word);
+            for (std::uint32_t p = place; p < place + leaf_size(word); ++p) {
                 const std::uint32_t b = p / block_lanes, lane = p % block_lanes;
                 const std::uint32_t prim = tree.blocks[b].prim[lane];
                 // A part of a triangle is not the only one.
