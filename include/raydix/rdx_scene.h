@@ -39,9 +39,9 @@ struct RdxCounts {
 template <class Scalar>
 struct BasicRdxScene {
     /// Committed. Its arrays, and in float the trees of its meshes, view the mapped file, which
-    /// stays mapped as long as one of them is in use: processes that load it share its memory. Nodes
-    /// of trees whose planes move when they are loaded (docs/algorithms/wide.md, local pads) do not.
-    /// Other trees are built.
+    /// stays mapped as long as one of them is in use: processes that load it share its memory.
+    /// Nodes of trees whose planes move when they are loaded (docs/algorithms/wide.md, local pads)
+    /// do not. Other trees are built.
     BasicScene<Scalar> scene;
     SceneOptions options;  // quality, usage and compact as its last commit had them
     std::string name;
