@@ -46,7 +46,8 @@ std::string cost_on(const std::vector<OperationCost>& costs, const Counted& row)
     });
     if (found == costs.end()) return "missing";
     const std::string least = std::to_string(found->instructions);
-    return found->most <= found->instructions ? least : least + " to " + std::to_string(found->most);
+    return found->most <= found->instructions ? least
+                                              : least + " to " + std::to_string(found->most);
 }
 
 /// One row for all kernels that have the same.
@@ -57,8 +58,8 @@ std::string table() {
     for (const Counted& row : counted) {
         std::string cells = " | " + kinds_of(row);
         for (const auto& costs : machines) cells += " | " + cost_on(costs, row);
-        const auto place = std::size_t(
-            std::find(op_names.begin(), op_names.end(), row.operation) - op_names.begin());
+        const auto place = std::size_t(std::find(op_names.begin(), op_names.end(), row.operation) -
+                                       op_names.begin());
         auto& same_operation = rows[place];
         const auto same = std::find_if(same_operation.begin(), same_operation.end(),
                                        [&](const auto& r) { return r.second == cells; });

@@ -170,14 +170,22 @@ HWY_INLINE std::uint32_t without_far_corner(D d, hn::Vec<D> farthest, hn::Vec<D>
 
 /// finish_hit, but for the limits of t and the area, for one ray and one triangle of a block, none
 /// of whose edge functions is 0 or NaN: most hits. Blocks hold no triangle without area. `origin`
-/// and `direction` are followed by a float more. False: test_exactly must be asked.
+/// and `direction` are followed by a float more. `alone`: of a ray by itself. Vectors of 512 bits
+/// would slow down the shorter ones around it on some processors
+/// (docs/performance/single-calls.md). False: test_exactly must be asked.
+template <bool alone>
 HWY_INLINE bool hit_lane(const TriangleBlock& block, std::uint32_t lane, const float* origin,
                          const float* direction, const RayClass& kind, float tmin,
                          TriangleHit& hit) {
 #if HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_AVX3
     // weigh_corners with a corner in each lane. The fourth lane's edge function is 0.
     const __m256d way = _mm256_cvtps_pd(_mm_set1_ps(direction[kind.kz]));
+#if HWY_TARGET == HWY_AVX3
+    const SeenCorners seen = alone ? see_corners(block, lane, origin, direction, kind, way)
+                                   : see_corners_at_once(block, lane, origin, direction, kind, way);
+#else
     const SeenCorners seen = see_corners(block, lane, origin, direction, kind, way);
+#endif
     const __m256d at = _mm256_fmsub_pd(seen.y, seen.next_x, _mm256_mul_pd(seen.x, seen.next_y));
     const __m256d halves = _mm256_hadd_pd(at, _mm256_mul_pd(at, seen.depth));
     const __m128d sums =

@@ -9,6 +9,9 @@
 
 #include <hwy/highway.h>
 
+#include <algorithm>
+#include <bit>
+
 #include "base/check.h"
 #include "trace/all_hits.h"
 #include "trace/simd/block_hits.h"
@@ -63,9 +66,10 @@ public:
     WideBest trace(std::uint32_t root, const WideBest& best) {
         best_ = best;
         if (!(frame_.tmin <= best_.t)) return best_;
-        if constexpr (may_have_local_pads)
-            if (tree_.local_pads) [[unlikely]]
-                return trace_with_local_pads(root);
+        best_.t += 0.0f;  // -0 becomes +0
+        if constexpr (!always_careful)
+            if (frame_.careful) [[unlikely]]
+                return trace_carefully(root);
         const Rates rates = plain_rates(frame_.near, frame_.far);
         std::uint32_t word = root;
         std::size_t top = 0;
@@ -83,7 +87,8 @@ protected:
     /// Visits the node or leaf `word`, which becomes the next one. False at the end.
     HWY_INLINE bool step(const Rates& rates, std::size_t& top, std::uint32_t& word) {
         if ((word & wide_leaf_bit) == 0) {
-            if (visit(tree_.template node<compact>(word), rates, top, word)) return true;
+            if (visit<always_careful>(tree_.template node<compact>(word), rates, top, word))
+                return true;
         } else if (test_leaf(word)) {
             return false;
         }
@@ -113,15 +118,21 @@ protected:
     }
     /// Compact nodes say where they are: their own rates see to it.
     static constexpr bool may_have_local_pads = !compact && std::is_same_v<Parts, NoParts>;
+    /// Whether all visits are: those of compact nodes, whose pads may turn the boxes of missing
+    /// children, and of parts of scenes, which are few.
+    static constexpr bool always_careful = !may_have_local_pads;
 
-    HWY_NOINLINE WideBest trace_with_local_pads(std::uint32_t word) {
+    /// Planes may overflow, or nodes have pads of their own.
+    HWY_NOINLINE WideBest trace_carefully(std::uint32_t word) {
         std::size_t top = 0;
         for (;;) {
             if ((word & wide_leaf_bit) == 0) {
                 const auto& node = tree_.template node<false>(word);
                 float near[3], far[3];
-                set_local_starts(tree_, node, frame_, near, far);
-                if (visit(node, plain_rates(near, far), top, word)) continue;
+                std::copy_n(frame_.near, 3, near);
+                std::copy_n(frame_.far, 3, far);
+                if (tree_.local_pads) set_local_starts(tree_, node, frame_, near, far);
+                if (visit<true>(node, plain_rates(near, far), top, word)) continue;
             } else if (test_leaf(word)) {
                 return best_;
             }
@@ -165,40 +176,63 @@ protected:
         return hn::ConvertTo(f8, hn::PromoteTo(I8(), hn::LoadU(B8(), from)));
     }
 
+    /// The larger and the smaller of a and b, as integers, which takes fewer clocks. Where they are
+    /// negative floats these are others, but negative ones too; not for NaN.
+    static HWY_INLINE V larger_of(V a, V b) {
+        return hn::BitCast(f8, hn::Max(hn::BitCast(I8(), a), hn::BitCast(I8(), b)));
+    }
+    static HWY_INLINE V smaller_of(V a, V b) {
+        return hn::BitCast(f8, hn::Min(hn::BitCast(I8(), a), hn::BitCast(I8(), b)));
+    }
+
     /// Where the ray enters children l to l + lanes8 - 1, and where it leaves or need not look.
-    template <class Node>
+    /// Unless `careful` a negative exit may be another one.
+    template <bool careful, class Node>
     HWY_INLINE void test_boxes(const Node& node, const Rates& rates, std::size_t l, V& entry,
                                V& exit) const {
         const auto* const boxes = &node.lo[0][0] + l;
-        entry = hn::Set(f8, frame_.tmin);
-        exit = hn::Set(f8, best_.t);
+        V near[3], far[3];
         for (int axis = 0; axis < 3; ++axis) {
-            const V near = planes(boxes + at_->near[axis]), far = planes(boxes + at_->far[axis]);
-            entry = hn::Max(hn::MulAdd(near, rates.rate[axis], rates.near[axis]), entry);
-            exit = hn::Min(hn::MulAdd(far, rates.rate[axis], rates.far[axis]), exit);
+            near[axis] =
+                hn::MulAdd(planes(boxes + at_->near[axis]), rates.rate[axis], rates.near[axis]);
+            far[axis] =
+                hn::MulAdd(planes(boxes + at_->far[axis]), rates.rate[axis], rates.far[axis]);
+        }
+        const V tmin = hn::Set(f8, frame_.tmin), tmax = hn::Set(f8, best_.t);
+        if constexpr (careful) {
+            // What is NaN does not count.
+            entry = hn::Max(near[2], hn::Max(near[1], hn::Max(near[0], tmin)));
+            exit = hn::Min(far[2], hn::Min(far[1], hn::Min(far[0], tmax)));
+        } else {
+            entry = larger_of(larger_of(near[0], near[1]), larger_of(near[2], tmin));
+            exit = smaller_of(smaller_of(far[0], far[1]), smaller_of(far[2], tmax));
         }
     }
 
     static constexpr bool may_take_nearest = wants_any(wanted) && !std::is_same_v<Parts, NoParts>;
 
-    /// Whether missing children must be looked for. Their boxes in a plain node are inside out, so
-    /// that no ray meets them unless something overflows; in a compact one pads may turn them.
-    static constexpr bool always_careful = compact;
-
-    /// A visit of a node: bits of the children that the ray meets, and where it enters each child
-    /// if that is asked for.
-    template <bool with_entries, class Node>
-    HWY_INLINE std::uint32_t meet(const Node& node, const Rates& about, float* entries) {
+    /// The children of a node that a ray meets.
+    struct Met {
+        V entry[parts8];  // where it enters each child
+        std::uint32_t slots = 0;
+        HWY_INLINE void store_entries(float* to) const {
+            for (std::size_t part = 0; part < parts8; ++part)
+                hn::Store(entry[part], f8, to + part * lanes8);
+        }
+    };
+    template <bool careful, class Node>
+    HWY_INLINE Met meet(const Node& node, const Rates& about) {
         if constexpr (counting) ++counts_.visits;
         const auto& rates = rates_of(node, about);
-        V entry, exit;
-        std::uint32_t met = 0;
-        for (std::size_t l = 0; l < 8; l += lanes8) {
-            test_boxes(node, rates, l, entry, exit);
-            met |= bits_of_le(entry, exit) << l;
-            if constexpr (with_entries) hn::Store(entry, f8, entries + l);
+        Met met;
+        for (std::size_t part = 0; part < parts8; ++part) {
+            V exit;
+            test_boxes<careful>(node, rates, part * lanes8, met.entry[part], exit);
+            met.slots |= bits_of_le(met.entry[part], exit) << part * lanes8;
         }
-        if (always_careful || frame_.careful) met &= used_slots(node);
+        // Missing children of plain nodes have boxes that are inside out, so that no ray meets them
+        // unless something overflows; in compact ones pads may turn them.
+        if (careful && (compact || frame_.careful)) met.slots &= used_slots(node);
         return met;
     }
 
@@ -237,33 +271,35 @@ protected:
     /// `word` becomes the nearest child that the ray meets, or for any hit that of the last slot;
     /// the others go onto the stack, the farthest or those of lower slots first. False if it meets
     /// none.
-    template <class Node>
+    template <bool careful, class Node>
     HWY_INLINE bool visit(const Node& node, const Rates& about, std::size_t& top,
                           std::uint32_t& word) {
-        HWY_ALIGN float entries[8];
-        constexpr bool with_entries = wants_closest(wanted) || may_take_nearest;
-        const std::uint32_t met = meet<with_entries>(node, about, entries);
-        if (met == 0) return false;
-        if ((met & (met - 1)) == 0) {
-            word = choose(node.child, static_cast<std::size_t>(std::countr_zero(met)));
+        const Met met = meet<careful>(node, about);
+        const std::uint32_t slots = met.slots;
+        if (slots == 0) return false;
+        if ((slots & (slots - 1)) == 0) {
+            word = choose(node.child, static_cast<std::size_t>(std::countr_zero(slots)));
         } else if constexpr (wants_closest(wanted)) {
-            push_sorted(node.child, entries, met, top, word);
+            push_sorted(node.child, met, top, word);
         } else {
             if constexpr (may_take_nearest) {
                 if constexpr (requires { parts_->is_at_hand(); }) {
-                    const std::uint32_t asked = parts_->is_at_hand() ? 0 : met;
+                    const std::uint32_t asked = parts_->is_at_hand() ? 0 : slots;
                     for (std::uint32_t left = asked; left != 0; left &= left - 1)
                         parts_->ask_for(node.child[std::countr_zero(left)]);
                 }
                 if (parts_->nearest_first) {
-                    const std::size_t nearest = nearest_of(entries, met);
-                    push_by_slot(node.child, met & ~(1u << nearest), top, word);
+                    HWY_ALIGN float entries[8];
+                    met.store_entries(entries);
+                    const std::size_t nearest = nearest_of(entries, slots);
+                    push_by_slot(node.child, slots & ~(1u << nearest), top, word);
                     stack_.words[top++] = word;
                     word = node.child[nearest];
                     return true;
                 }
             }
-            push_by_slot(node.child, met, top, word);
+            push_by_slot(node.child, slots, top, word);
+            if constexpr (std::is_same_v<Parts, NoParts>) ask_for_child(stack_.words[top - 1]);
         }
         return true;
     }
@@ -299,26 +335,33 @@ protected:
     }
 
     /// Two children or more, by where the ray enters them.
-    HWY_INLINE void push_sorted(const std::uint32_t* child, const float* entries, std::uint32_t met,
-                                std::size_t& top, std::uint32_t& word) {
-        const auto push = [&](std::size_t slot) {
-            ask_for_child(child[slot]);
-            stack_.words[top] = child[slot];
-            stack_.entries[top++] = entries[slot];
-        };
-        const std::uint32_t others = met & (met - 1);
-        if ((others & (others - 1)) == 0) {
-            const auto first = static_cast<std::size_t>(std::countr_zero(met)),
-                       second = static_cast<std::size_t>(std::countr_zero(others));
-            const bool swap = entries[second] < entries[first];
-            word = choose(child, swap ? second : first);
-            push(swap ? first : second);
-            return;
-        }
+    HWY_INLINE void push_sorted(const std::uint32_t* child, const Met& met, std::size_t& top,
+                                std::uint32_t& word) {
+        const auto others = static_cast<std::uint32_t>(std::popcount(met.slots)) - 1;
+#if HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_AVX3
+        const __m256i slots = slots_by_entry(met.entry[0], met.slots);
+        word = choose(child, static_cast<std::uint32_t>(_mm256_cvtsi256_si32(slots)) & 7);
+        const __m256i farthest_first =
+            _mm256_sub_epi32(_mm256_set1_epi32(static_cast<int>(others)), hn::Iota(I8(), 0).raw);
+        const __m256i pushed = _mm256_permutevar8x32_epi32(slots, farthest_first);
+        const auto* const words = reinterpret_cast<const __m256i*>(child);
+        _mm256_storeu_si256(reinterpret_cast<__m256i*>(stack_.words + top),
+                            _mm256_permutevar8x32_epi32(_mm256_load_si256(words), pushed));
+        _mm256_storeu_ps(stack_.entries + top, _mm256_permutevar8x32_ps(met.entry[0].raw, pushed));
+        for (std::size_t k = 0; k < others; ++k) ask_for_child(stack_.words[top + k]);
+        top += others;
+#else
+        HWY_ALIGN float entries[8];
+        met.store_entries(entries);
         std::uint32_t order[8];
-        const std::size_t last = order_by_entry(met, entries, order) - 1;
-        word = choose(child, order[last]);
-        for (std::size_t k = 0; k < last; ++k) push(order[k]);
+        order_by_entry(met.slots, entries, order);
+        for (std::size_t k = 0; k < others; ++k) {
+            ask_for_child(child[order[k]]);
+            stack_.words[top] = child[order[k]];
+            stack_.entries[top++] = entries[order[k]];
+        }
+        word = choose(child, order[others]);
+#endif
     }
 
     struct Leaf {
@@ -411,8 +454,9 @@ protected:
         for (; candidates != 0; candidates &= candidates - 1) {
             const auto lane = static_cast<std::uint32_t>(std::countr_zero(candidates));
             TriangleHit hit;
-            if ((clear >> lane & 1) != 0 && hit_lane(block, lane, frame_.origin, frame_.direction,
-                                                     frame_.kind, frame_.tmin, hit)
+            if ((clear >> lane & 1) != 0 &&
+                        hit_lane<true>(block, lane, frame_.origin, frame_.direction, frame_.kind,
+                                       frame_.tmin, hit)
                     ? !(hit.t >= frame_.tmin && hit.t <= best_.t)
                     : !test_exactly<edge_rule(wanted)>(frame_.triangle_ray(), block, lane, best_.t,
                                                        hit))

@@ -390,7 +390,8 @@ private:
                                bool is_clear) {
         const StreamRay& ray = rays_[k];
         TriangleHit hit;
-        if (is_clear && hit_lane(block, lane, ray.origin, ray.direction, frame_.kind, ray.tmin, hit)
+        if (is_clear && hit_lane<false>(block, lane, ray.origin, ray.direction, frame_.kind,
+                                        ray.tmin, hit)
                 ? hit.t >= ray.tmin && hit.t <= ray.t
                 : test_exactly(frame_.triangle_ray(ray), block, lane, ray.t, hit))
             take(k, hit.t, block.prim[lane], hit.u, hit.v);

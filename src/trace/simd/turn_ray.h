@@ -101,7 +101,8 @@ public:
         const SingleFrame& frame = this->frame_;
         const auto lane = static_cast<std::uint32_t>(std::countr_zero(open_.open));
         const TriangleBlock& here = block();
-        is_sure_ = hit_lane(here, lane, frame.origin, frame.direction, frame.kind, tmin_, hit_);
+        is_sure_ =
+            hit_lane<false>(here, lane, frame.origin, frame.direction, frame.kind, tmin_, hit_);
         prim_ = here.prim[lane];
     }
     HWY_INLINE void keep_hit() {
@@ -197,7 +198,7 @@ private:
     HWY_INLINE void test_boxes(const Node& node, std::size_t l, V& entry, V& exit) const {
         if constexpr (compact) {
             const auto about = this->plain_rates(frame_.near, frame_.far);
-            Base::test_boxes(node, this->rates_of(node, about), l, entry, exit);
+            Base::template test_boxes<true>(node, this->rates_of(node, about), l, entry, exit);
             return;
         }
         const auto* const boxes = reinterpret_cast<const float*>(next_address_) + l;
@@ -222,7 +223,7 @@ private:
         test_boxes(node, l, entry, exit);
         auto mask = hn::Le(entry, exit);
         std::uint32_t met = bits_of(f8, mask);
-        if (Base::always_careful || planes_ >> careful_bit != 0) {
+        if (compact || planes_ >> careful_bit != 0) {
             met &= used_slots(node) >> l;
             mask = mask_of(f8, met);
         }
