@@ -143,10 +143,12 @@ HWY_INLINE __m128i compare_exchange(__m128i key, __m128i partner) {
 #endif
 
 #if HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_AVX3
-/// `slots`, two or more, in the last three bits of lanes, the smallest of `entries` first, which is
-/// not quite the smallest where they differ in the last digits alone. No entry is negative.
+/// `slots`, two or more, the smallest of `entries` first, which is not quite the smallest where
+/// they differ in the last digits alone; of equal ones the higher slot. No entry is negative. Lanes
+/// behind them mean nothing.
 HWY_INLINE __m256i slots_by_entry(hn::Vec<F8> entries, std::uint32_t slots) {
-    const __m256i own = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7), digits = _mm256_set1_epi32(7);
+    // Keys end with 7 - slot.
+    const __m256i own = _mm256_setr_epi32(7, 6, 5, 4, 3, 2, 1, 0), digits = _mm256_set1_epi32(7);
     const __m256i all =
         _mm256_or_si256(_mm256_andnot_si256(digits, _mm256_castps_si256(entries.raw)), own);
     const auto count = static_cast<std::uint32_t>(std::popcount(slots));
@@ -157,7 +159,7 @@ HWY_INLINE __m256i slots_by_entry(hn::Vec<F8> entries, std::uint32_t slots) {
     const auto packed = compress(f8, hn::BitCast(f8, hn::Vec<I8>{all}), slots);
     __m256i keys =
         _mm256_blendv_epi8(_mm256_castps_si256(packed.raw), none,
-                           _mm256_cmpgt_epi32(own, _mm256_set1_epi32(static_cast<int>(count) - 1)));
+                           _mm256_cmpgt_epi32(_mm256_set1_epi32(8 - static_cast<int>(count)), own));
 #endif
     // Bitonic (Batcher 1968): four in three steps, eight in three more.
     __m128i four = _mm256_castsi256_si128(keys);
@@ -165,14 +167,15 @@ HWY_INLINE __m256i slots_by_entry(hn::Vec<F8> entries, std::uint32_t slots) {
         four = compare_exchange<0b0110>(four, _mm_shuffle_epi32(four, 0b10110001));
         four = compare_exchange<0b1100>(four, _mm_shuffle_epi32(four, 0b01001110));
         four = compare_exchange<0b1010>(four, _mm_shuffle_epi32(four, 0b10110001));
-        return _mm256_castsi128_si256(four);
+        return _mm256_andnot_si256(_mm256_castsi128_si256(four), digits);
     }
     keys = compare_exchange<0b01100110>(keys, _mm256_shuffle_epi32(keys, 0b10110001));
     keys = compare_exchange<0b00111100>(keys, _mm256_shuffle_epi32(keys, 0b01001110));
     keys = compare_exchange<0b01011010>(keys, _mm256_shuffle_epi32(keys, 0b10110001));
     keys = compare_exchange<0b11110000>(keys, _mm256_permute4x64_epi64(keys, 0b01001110));
     keys = compare_exchange<0b11001100>(keys, _mm256_shuffle_epi32(keys, 0b01001110));
-    return compare_exchange<0b10101010>(keys, _mm256_shuffle_epi32(keys, 0b10110001));
+    keys = compare_exchange<0b10101010>(keys, _mm256_shuffle_epi32(keys, 0b10110001));
+    return _mm256_andnot_si256(keys, digits);
 }
 #endif
 

@@ -340,7 +340,7 @@ protected:
         const auto others = static_cast<std::uint32_t>(std::popcount(met.slots)) - 1;
 #if HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_AVX3
         const __m256i slots = slots_by_entry(met.entry[0], met.slots);
-        word = choose(child, static_cast<std::uint32_t>(_mm256_cvtsi256_si32(slots)) & 7);
+        word = choose(child, static_cast<std::uint32_t>(_mm256_cvtsi256_si32(slots)));
         const __m256i farthest_first =
             _mm256_sub_epi32(_mm256_set1_epi32(static_cast<int>(others)), hn::Iota(I8(), 0).raw);
         const __m256i pushed = _mm256_permutevar8x32_epi32(slots, farthest_first);
