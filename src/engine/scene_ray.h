@@ -16,7 +16,7 @@
 #include "engine/scene_job.h"
 #include "engine/shape_leaves.h"
 #include "trace/simd/lanes_double.h"
-#include "trace/simd/single.h"
+#include "trace/simd/single_calls.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace raydix::HWY_NAMESPACE {

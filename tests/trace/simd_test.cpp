@@ -241,6 +241,56 @@ TEST(Simd, NastyRays) {
     expect_like_scalar("nasty rays", build_bvh(scene.mesh()), rays);
 }
 
+/// Each ray as a call of its own, by every instruction set and by closest_hit.
+void expect_alone_like_scalar(const Bvh& bvh, std::span<const Ray> rays) {
+    const std::vector<Hit> wanted = trace(bvh, rays);
+    for (const WideBvhOptions layout : {WideBvhOptions{}, WideBvhOptions{.compact = true}}) {
+        const WideBvh tree(bvh, layout);
+        for (std::size_t i = 0; i < rays.size(); ++i) {
+            SCOPED_TRACE(testing::Message() << "ray " << i << ", compact " << layout.compact);
+            std::vector<Hit> hits{closest_hit(tree, rays[i])};
+            std::vector<std::uint8_t> any{any_hit(tree, rays[i])};
+            for (const std::string& isa : simd_instruction_sets()) {
+                Hit hit;
+                std::uint8_t occluded = 0;
+                trace(tree, rays.subspan(i, 1), std::span(&hit, 1), {.isa = isa});
+                trace_any(tree, rays.subspan(i, 1), std::span(&occluded, 1), {.isa = isa});
+                hits.push_back(hit), any.push_back(occluded);
+            }
+            for (const Hit& hit : hits) {
+                ASSERT_EQ(hit.prim, wanted[i].prim);
+                ASSERT_EQ(hit.t, wanted[i].t);
+            }
+            for (const std::uint8_t found : any) ASSERT_EQ(found != 0, wanted[i].hit());
+        }
+    }
+}
+
+TEST(Simd, RaysThatEndWhereTheyBegin) {
+    std::vector<Ray> rays;
+    std::mt19937_64 random(seed);
+    const auto unit = [&] { return static_cast<float>(random() >> 40) * 0x1p-24f; };
+    for (int k = 0; k < 800; ++k) {
+        const auto zero = [&](int bit) { return k >> bit & 1 ? -0.0f : 0.0f; };
+        rays.push_back({{unit(), unit(), zero(0)},
+                        zero(1),
+                        {unit() - 0.5f, unit() - 0.5f, k & 16 ? -1.0f : 1.0f},
+                        k & 8 ? 0x1p-149f * static_cast<float>(k % 3) : zero(2)});
+    }
+    Mesh flat = random_soup(500, 3, 0.5f);
+    for (Vec3& v : flat.vertices) v.z = 0;
+    const Bvh bvh = build_bvh(flat);
+    expect_like_scalar("rays that end where they begin", bvh, rays);
+    expect_alone_like_scalar(bvh, rays);
+}
+
+TEST(Simd, RaysAloneLikeScalar) {
+    for (const std::uint64_t number : {1, 2, 3}) {
+        const Model scene = scene_of(random_soup(2000, number, number == 3 ? 1.0f : 0.2f), "soup");
+        expect_alone_like_scalar(build_bvh(scene.mesh()), make_mixed_rays(scene, 400, seed));
+    }
+}
+
 TEST(Simd, NastyMeshes) {
     const Mesh soup = random_soup(500, 6, 0.3f);
     Mesh laced = soup;

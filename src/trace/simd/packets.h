@@ -15,7 +15,7 @@
 
 #include "trace/simd/packet.h"
 #include "trace/simd/ray_vectors.h"
-#include "trace/simd/single.h"
+#include "trace/simd/single_calls.h"
 #include "trace/simd/stream.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -484,14 +484,15 @@ inline void streams(const SimdJob& job, SimdCounts& counts) {
 
 inline void packets(const SimdJob& job, SimdCounts& counts) {
     with_constants(job, [&](auto counting, auto compact) {
-        if (job.all != nullptr)
-            trace_packets<Wanted::all, counting, compact>(job, counts);
-        else if (job.check != nullptr)
-            !job.hits ? trace_packets<Wanted::any_accepted, counting, compact>(job, counts)
-                      : trace_packets<Wanted::closest_accepted, counting, compact>(job, counts);
-        else
-            !job.hits ? trace_packets<Wanted::any, counting, compact>(job, counts)
-                      : trace_packets<Wanted::closest, counting, compact>(job, counts);
+        if constexpr (counting) {
+            if (job.all != nullptr) return trace_packets<Wanted::all, true, compact>(job, counts);
+            if (job.check != nullptr)
+                return job.hits
+                           ? trace_packets<Wanted::closest_accepted, true, compact>(job, counts)
+                           : trace_packets<Wanted::any_accepted, true, compact>(job, counts);
+        }
+        job.hits ? trace_packets<Wanted::closest, counting, compact>(job, counts)
+                 : trace_packets<Wanted::any, counting, compact>(job, counts);
     });
 }
 

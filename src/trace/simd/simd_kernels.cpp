@@ -17,7 +17,7 @@
 #include "base/baseline_isa.h"
 #include "trace/simd/packet.h"
 #include "trace/simd/packets.h"
-#include "trace/simd/single.h"
+#include "trace/simd/single_calls.h"
 #include "trace/simd/turns.h"
 
 HWY_BEFORE_NAMESPACE();

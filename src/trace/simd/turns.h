@@ -14,6 +14,7 @@
 #include <optional>
 #include <type_traits>
 
+#include "trace/simd/single_calls.h"
 #include "trace/simd/single_frames.h"
 #include "trace/simd/turn_ray.h"
 
@@ -232,15 +233,16 @@ private:
 
 inline void single(const SimdJob& job, SimdCounts& counts) {
     with_constants(job, [&](auto counting, auto compact) {
-        if (job.all != nullptr)
-            RayTurns<Wanted::all, counting, compact>(job, counts).trace();
-        else if (job.check != nullptr)
-            job.hits ? RayTurns<Wanted::closest_accepted, counting, compact>(job, counts).trace()
-                     : RayTurns<Wanted::any_accepted, counting, compact>(job, counts).trace();
-        else if (job.hits)
-            RayTurns<Wanted::closest, counting, compact>(job, counts).trace();
-        else
-            RayTurns<Wanted::any, counting, compact>(job, counts).trace();
+        if constexpr (counting) {
+            if (job.all != nullptr)
+                return RayTurns<Wanted::all, true, compact>(job, counts).trace();
+            if (job.check != nullptr)
+                return job.hits
+                           ? RayTurns<Wanted::closest_accepted, true, compact>(job, counts).trace()
+                           : RayTurns<Wanted::any_accepted, true, compact>(job, counts).trace();
+        }
+        job.hits ? RayTurns<Wanted::closest, counting, compact>(job, counts).trace()
+                 : RayTurns<Wanted::any, counting, compact>(job, counts).trace();
     });
 }
 
