@@ -166,9 +166,12 @@ TEST(MemoryEndsInATrace, TheNextOneOfTheThreadIsWhole) {
         for (const std::uint32_t corner : t)
             boxes.back() = unite(boxes.back(), Aabb{mesh.vertices[corner], mesh.vertices[corner]});
     }
-    balls.add(UserGeometry(boxes, [](std::uint32_t, const Ray&, Hit& hit) {
-        hit.t = 0.5f;
-        return true;
+    balls.add(UserGeometry(boxes, [&boxes](std::uint32_t k, const Ray& ray, Hit& hit) {
+        hit.t = (boxes[k].hi.z - ray.origin.z) / ray.direction.z;
+        const float x = ray.origin.x + hit.t * ray.direction.x,
+                    y = ray.origin.y + hit.t * ray.direction.y;
+        return hit.t >= ray.tmin && hit.t <= ray.tmax && x > boxes[k].lo.x && x < boxes[k].hi.x &&
+               y > boxes[k].lo.y && y < boxes[k].hi.y;
     }));
     balls.add(mesh);
     placed.commit();

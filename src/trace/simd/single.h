@@ -175,8 +175,8 @@ protected:
         return hn::ConvertTo(f8, hn::PromoteTo(I8(), hn::LoadU(B8(), from)));
     }
 
-    /// The larger and the smaller of a and b, as integers, which takes fewer clocks. Where they are
-    /// negative floats these are others, but negative ones too; not for NaN.
+    /// The larger and the smaller of a and b, as integers, which takes fewer clocks. Of negative
+    /// floats, or -0, it may be the other one. Not for NaN.
     static HWY_INLINE V larger_of(V a, V b) {
         return hn::BitCast(f8, hn::Max(hn::BitCast(I8(), a), hn::BitCast(I8(), b)));
     }
