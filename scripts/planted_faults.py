@@ -550,4 +550,8 @@ FAULTS = [
           "files: planes about a median lie about the middle", "engine"),
     Fault("src/layout/local_pads.cpp", "box_of_leaf(word) : boxes[word];", "box_of_leaf(word) : boxes[k];",
           "local pads: boxes of inner nodes are those before them", "engine"),
+    Fault("src/trace/simd/single.h", "if (frame_.careful) [[unlikely]]", "if (false)",
+          "one ray: what is NaN where planes overflow counts", "trace"),
+    Fault("src/trace/simd/children.h", "_mm256_mask_compress_epi32(none, ", "_mm256_maskz_compress_epi32(",
+          "one ray: children that it does not meet come first", "trace"),
 ]
