@@ -98,13 +98,13 @@ void compare(WorkloadFigures& workload, std::vector<Contender>& all, bool any,
 void time_portion(std::vector<Contender>& all, bool any, const Portion& portion,
                   const CpuBench& options) {
     const clockid_t clock = clock_from(options.clock);
-    const bool warms_up = portion.rays.size() < rays_of_a_long_pass;
+    const int warm_ups = portion.rays.size() < rays_of_a_long_pass ? warm_ups_of_a_short_pass : 0;
     Answers answers;
     answers.make_room(any, portion.rays.size());
     for (int round = 0; round < options.rounds; ++round)
         for (Contender& c : all)
             with_threads(c.figures.threads, [&] {
-                if (warms_up) send(c.mode, any, portion, answers);
+                for (int k = 0; k < warm_ups; ++k) send(c.mode, any, portion, answers);
                 const double start = seconds_of(clock);
                 send(c.mode, any, portion, answers);
                 c.ms[std::size_t(round)] += 1e3 * (seconds_of(clock) - start);
