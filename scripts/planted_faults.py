@@ -551,7 +551,7 @@ FAULTS = [
     Fault("src/layout/local_pads.cpp", "box_of_leaf(word) : boxes[word];", "box_of_leaf(word) : boxes[k];",
           "local pads: boxes of inner nodes are those before them", "engine"),
     Fault("src/trace/simd/single.h", "if (frame_.careful) [[unlikely]]", "if (false)",
-          "one ray: what is NaN where planes overflow counts", "trace"),
+          "one ray: pads are those of the whole tree", "engine"),
     Fault("src/trace/simd/children.h", "_mm256_mask_compress_epi32(none, ", "_mm256_maskz_compress_epi32(",
           "one ray: children that it does not meet come first", "trace"),
 ]
