@@ -140,9 +140,19 @@ template <int larger>
 HWY_INLINE __m128i compare_exchange(__m128i key, __m128i partner) {
     return _mm_blend_epi32(_mm_min_epi32(key, partner), _mm_max_epi32(key, partner), larger);
 }
-#endif
 
-#if HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_AVX3
+/// Eight keys in order. Bitonic (Batcher 1968).
+template <bool largest_first>
+HWY_INLINE __m256i sorted_eight(__m256i key) {
+    constexpr int other = largest_first ? 0 : 0xFF;
+    key = compare_exchange<0b10011001 ^ other>(key, _mm256_shuffle_epi32(key, 0b10110001));
+    key = compare_exchange<0b11000011 ^ other>(key, _mm256_shuffle_epi32(key, 0b01001110));
+    key = compare_exchange<0b10100101 ^ other>(key, _mm256_shuffle_epi32(key, 0b10110001));
+    key = compare_exchange<0b00001111 ^ other>(key, _mm256_permute4x64_epi64(key, 0b01001110));
+    key = compare_exchange<0b00110011 ^ other>(key, _mm256_shuffle_epi32(key, 0b01001110));
+    return compare_exchange<0b01010101 ^ other>(key, _mm256_shuffle_epi32(key, 0b10110001));
+}
+
 /// `slots`, two or more, the smallest of `entries` first, which is not quite the smallest where
 /// they differ in the last digits alone; of equal ones the higher slot. No entry is negative. Lanes
 /// behind them mean nothing.
@@ -154,14 +164,14 @@ HWY_INLINE __m256i slots_by_entry(hn::Vec<F8> entries, std::uint32_t slots) {
     const auto count = static_cast<std::uint32_t>(std::popcount(slots));
     const __m256i none = _mm256_set1_epi32(INT32_MAX);
 #if HWY_TARGET == HWY_AVX3
-    __m256i keys = _mm256_mask_compress_epi32(none, static_cast<__mmask8>(slots), all);
+    const __m256i keys = _mm256_mask_compress_epi32(none, static_cast<__mmask8>(slots), all);
 #else
     const auto packed = compress(f8, hn::BitCast(f8, hn::Vec<I8>{all}), slots);
-    __m256i keys =
+    const __m256i keys =
         _mm256_blendv_epi8(_mm256_castps_si256(packed.raw), none,
                            _mm256_cmpgt_epi32(_mm256_set1_epi32(8 - static_cast<int>(count)), own));
 #endif
-    // Bitonic (Batcher 1968): four in three steps, eight in three more.
+    // Four in three steps of the same network.
     __m128i four = _mm256_castsi256_si128(keys);
     if (count <= 4) [[likely]] {
         four = compare_exchange<0b0110>(four, _mm_shuffle_epi32(four, 0b10110001));
@@ -169,13 +179,7 @@ HWY_INLINE __m256i slots_by_entry(hn::Vec<F8> entries, std::uint32_t slots) {
         four = compare_exchange<0b1010>(four, _mm_shuffle_epi32(four, 0b10110001));
         return _mm256_andnot_si256(_mm256_castsi128_si256(four), digits);
     }
-    keys = compare_exchange<0b01100110>(keys, _mm256_shuffle_epi32(keys, 0b10110001));
-    keys = compare_exchange<0b00111100>(keys, _mm256_shuffle_epi32(keys, 0b01001110));
-    keys = compare_exchange<0b01011010>(keys, _mm256_shuffle_epi32(keys, 0b10110001));
-    keys = compare_exchange<0b11110000>(keys, _mm256_permute4x64_epi64(keys, 0b01001110));
-    keys = compare_exchange<0b11001100>(keys, _mm256_shuffle_epi32(keys, 0b01001110));
-    keys = compare_exchange<0b10101010>(keys, _mm256_shuffle_epi32(keys, 0b10110001));
-    return _mm256_andnot_si256(keys, digits);
+    return _mm256_andnot_si256(sorted_eight<false>(keys), digits);
 }
 #endif
 
@@ -200,13 +204,7 @@ HWY_INLINE std::uint32_t order_by_entry(std::uint32_t slots, const float* entrie
     const __m256i by_size = _mm256_xor_si256(entry, _mm256_srli_epi32(sign, 1));
     __m256i key = _mm256_or_si256(_mm256_andnot_si256(digits, by_size), own);
     key = _mm256_blendv_epi8(_mm256_set1_epi32(INT32_MIN), key, there);
-    // Bitonic (Batcher 1968), the largest first.
-    key = compare_exchange<0b10011001>(key, _mm256_shuffle_epi32(key, 0b10110001));
-    key = compare_exchange<0b11000011>(key, _mm256_shuffle_epi32(key, 0b01001110));
-    key = compare_exchange<0b10100101>(key, _mm256_shuffle_epi32(key, 0b10110001));
-    key = compare_exchange<0b00001111>(key, _mm256_permute4x64_epi64(key, 0b01001110));
-    key = compare_exchange<0b00110011>(key, _mm256_shuffle_epi32(key, 0b01001110));
-    key = compare_exchange<0b01010101>(key, _mm256_shuffle_epi32(key, 0b10110001));
+    key = sorted_eight<true>(key);
     _mm256_storeu_si256(reinterpret_cast<__m256i*>(order), _mm256_andnot_si256(key, digits));
     return number;
 #else
