@@ -10,21 +10,6 @@
 namespace raydix::bench {
 namespace {
 
-struct Cloud {
-    std::span<const Vec3> points;
-
-    [[nodiscard]] std::size_t kdtree_get_point_count() const { return points.size(); }
-    [[nodiscard]] float kdtree_get_pt(std::size_t i, std::size_t d) const {
-        return (&points[i].x)[d];
-    }
-    template <class Box>
-    bool kdtree_get_bbox(Box&) const {
-        return false;
-    }
-};
-using Index = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, Cloud>, Cloud,
-                                                  3, std::uint32_t>;
-
 /// body(thread, begin, end) for chunks of [0, n).
 template <class Body>
 void in_chunks(std::size_t n, int threads, const Body& body) {
@@ -43,6 +28,21 @@ void in_chunks(std::size_t n, int threads, const Body& body) {
 }  // namespace
 
 struct PointPeer::Tree {
+    struct Cloud {
+        std::span<const Vec3> points;
+
+        [[nodiscard]] std::size_t kdtree_get_point_count() const { return points.size(); }
+        [[nodiscard]] float kdtree_get_pt(std::size_t i, std::size_t d) const {
+            return (&points[i].x)[d];
+        }
+        template <class Box>
+        bool kdtree_get_bbox(Box&) const {
+            return false;
+        }
+    };
+    using Index = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, Cloud>,
+                                                      Cloud, 3, std::uint32_t>;
+
     Cloud cloud;
     int max_leaf;
     Index index;

@@ -22,9 +22,9 @@ constexpr int trials = 3;
 enum Part : std::size_t { commit_part, primary_part, ao_part, part_count };
 
 /// One side, and what its frames took.
-class Contender {
+class ContenderInMotion {
 public:
-    Contender(FrameSide& side, bool ours, const SceneBench& options)
+    ContenderInMotion(FrameSide& side, bool ours, const SceneBench& options)
         : side_(side), ours_(ours), clock_(clock_from(options.clock)) {}
 
     [[nodiscard]] FrameSide& side() const { return side_; }
@@ -95,17 +95,17 @@ private:
 };
 
 /// Adds what peers answer otherwise than we do, of whom the first one is. All have the same frame.
-void compare(std::vector<Contender>& all, std::span<const Ray> rays, bool any,
+void compare(std::vector<ContenderInMotion>& all, std::span<const Ray> rays, bool any,
              const SceneBench& options, std::uint64_t& hits) {
-    const auto answers_of = [&](const Contender& c) {
+    const auto answers_of = [&](const ContenderInMotion& c) {
         c.side().rays().take(rays);
         send(any ? c.ao() : c.primary(), any);
         return Answers(c.side().rays(), any, rays.size());
     };
-    const Contender& ours = all.front();
+    const ContenderInMotion& ours = all.front();
     const Answers expected = answers_of(ours);
     hits += expected.hit_count();
-    for (Contender& peer : all) {
+    for (ContenderInMotion& peer : all) {
         if (peer.is_ours()) continue;
         const Answers answers = answers_of(peer);
         if (!peer.differences) peer.differences.emplace();
@@ -168,7 +168,7 @@ std::vector<Question> ask_frames(const Question& about, const MovingPicture& pic
                                  FrameSide& ours,
                                  const std::vector<std::unique_ptr<FrameSide>>& peers,
                                  FrameSide& guide, const SceneBench& options) {
-    std::vector<Contender> all;
+    std::vector<ContenderInMotion> all;
     all.emplace_back(ours, true, options);
     for (const auto& peer : peers) all.emplace_back(*peer, false, options);
     Question frame = about;
@@ -183,7 +183,7 @@ std::vector<Question> ask_frames(const Question& about, const MovingPicture& pic
         guide.rays().take(picture.primary());
         guide_mode.closest();
         const std::vector<Ray> ao = picture.ao(vertices, guide.rays());
-        for (Contender& c : all) {
+        for (ContenderInMotion& c : all) {
             c.side().move(vertices);
             if (f != 0) continue;
             c.side().commit();
@@ -197,9 +197,9 @@ std::vector<Question> ask_frames(const Question& about, const MovingPicture& pic
         compare(all, picture.primary(), false, options, frame.hits);
         compare(all, ao, true, options, frame.hits);
     }
-    const Contender& best =
-        *std::ranges::min_element(all.begin() + 1, all.end(), {}, &Contender::median_ms);
-    for (const Contender& c : all) frame.modes.push_back(c.frame());
+    const ContenderInMotion& best =
+        *std::ranges::min_element(all.begin() + 1, all.end(), {}, &ContenderInMotion::median_ms);
+    for (const ContenderInMotion& c : all) frame.modes.push_back(c.frame());
     std::vector<Question> questions{frame};
     const char* texts[] = {"commit", "primary", "ao"};
     for (const Part part : {commit_part, primary_part, ao_part}) {

@@ -29,6 +29,7 @@ set(RAYDIX_HAVE_MPI ON)
 file(GLOB raydix_mpi_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/mpi/*.cpp)
 add_library(raydix_mpi STATIC ${raydix_mpi_sources})
 set_target_properties(raydix_mpi PROPERTIES EXPORT_NAME mpi)
+raydix_unity(raydix_mpi 6)
 if(NOT RAYDIX_TOP_LEVEL AND NOT RAYDIX_INSTALL)  # another project builds it if it links it
     set_target_properties(raydix_mpi PROPERTIES EXCLUDE_FROM_ALL ON)
 endif()

@@ -13,7 +13,7 @@
 namespace raydix {
 namespace {
 
-constexpr std::uint64_t seed = 20051101;
+constexpr std::uint64_t exact_product_seed = 20051101;
 using Exact = boost::multiprecision::cpp_rational;
 
 int sign(double x) { return x > 0 ? 1 : x < 0 ? -1 : 0; }
@@ -34,7 +34,7 @@ public:
     std::uint64_t below(std::uint64_t n) { return engine_() % n; }
 
 private:
-    std::mt19937_64 engine_{seed};
+    std::mt19937_64 engine_{exact_product_seed};
 };
 
 TEST(ExactProduct, SignsAreThoseOfExactArithmetic) {
@@ -51,7 +51,8 @@ TEST(ExactProduct, SignsAreThoseOfExactArithmetic) {
         if (numbers.below(2) != 0) std::swap(c, d);
         if (numbers.below(4) == 0) c *= 0.5, d *= 2.0;
         const int expected = exact_sign(a, b, c, d);
-        ASSERT_EQ(sign(product_difference(a, b, c, d)), expected) << "seed " << seed << ", " << i;
+        ASSERT_EQ(sign(product_difference(a, b, c, d)), expected)
+            << "seed " << exact_product_seed << ", " << i;
         ASSERT_EQ(sign(product_difference(c, d, a, b)), -expected);
         lost += a * b - c * d == 0.0 && expected != 0;
         zeros += expected == 0;

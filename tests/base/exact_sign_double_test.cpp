@@ -13,7 +13,7 @@
 namespace raydix::test {
 namespace {
 
-constexpr std::uint64_t seed = 19971002;
+constexpr std::uint64_t exact_sign_double_seed = 19971002;
 
 int exact_side(Vec3d a, Vec3d b, Vec3d c, Vec3d d) {
     const ExactPoint at = exact(a);
@@ -35,7 +35,7 @@ Vec3d near_plane(Vec3d a, Vec3d b, Vec3d c, RandomD& random) {
 }
 
 TEST(ExactSignDouble, AreThoseOfExactArithmetic) {
-    RandomD random(seed);
+    RandomD random(exact_sign_double_seed);
     int zeros = 0;
     for (int i = 0; i < 1000 * int{thorough}; ++i) {
         const double scale = i % 3 == 0 ? 1e12 : i % 3 == 1 ? 1.0 : 0x1p-490;
@@ -47,7 +47,8 @@ TEST(ExactSignDouble, AreThoseOfExactArithmetic) {
         a = without_tiny(a), b = without_tiny(b), c = without_tiny(c), d = without_tiny(d);
         const int expected = exact_side(a, b, c, d);
         zeros += expected == 0;
-        ASSERT_EQ(side_of_plane(a, b, c, d), expected) << "seed " << seed << ", " << i;
+        ASSERT_EQ(side_of_plane(a, b, c, d), expected)
+            << "seed " << exact_sign_double_seed << ", " << i;
         ASSERT_EQ(side_of_plane(b, a, c, d), -expected) << i;
         ASSERT_EQ(exact_side_of_plane(a, b, c, d), expected) << i;
         const Point2d p{a.x, a.y}, q{b.x, b.y}, r{d.x, d.y};

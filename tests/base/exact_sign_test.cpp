@@ -10,12 +10,12 @@
 namespace raydix {
 namespace {
 
-constexpr std::uint64_t seed = 19970101;
+constexpr std::uint64_t exact_sign_seed = 19970101;
 __extension__ using Wide = __int128;
 
 /// Lattice points with up to 22 bits a coordinate, often on one plane or line.
 struct Lattice {
-    std::mt19937_64 random{seed};
+    std::mt19937_64 random{exact_sign_seed};
     std::int64_t range = 1 << 22;
     float coordinate() {
         return static_cast<float>(
@@ -51,7 +51,8 @@ TEST(ExactSign, SidesOfPlanesAreThoseOfIntegers) {
         }
         const int expected = wide_side(a, b, c, d);
         zeros += expected == 0;
-        ASSERT_EQ(side_of_plane(a, b, c, d), expected) << "seed " << seed << " case " << i;
+        ASSERT_EQ(side_of_plane(a, b, c, d), expected)
+            << "seed " << exact_sign_seed << " case " << i;
         ASSERT_EQ(side_of_plane(b, c, a, d), expected);
         ASSERT_EQ(side_of_plane(b, a, c, d), -expected);
         // The same far down in the range of floats, and turned around.
@@ -72,10 +73,12 @@ TEST(ExactSign, DecidesWhatDoubleCannot) {
     EXPECT_EQ(side_of_plane(a, b, c, {1e12f, 1e12f, 0}), 0);
     EXPECT_EQ(side_of_plane(a, b, c, {1e12f, 1e12f, step}), 1);
     EXPECT_EQ(side_of_plane(a, b, c, {1e12f, 1e12f, -step}), -1);
-    EXPECT_EQ(turn_sign({0, 0}, {3e38f, 3e38f}, {3e38f, std::nextafter(3e38f, infinity)}), 1);
-    EXPECT_EQ(turn_sign({-3e38f, -3e38f}, {3e38f, 3e38f}, {step, 0}), -1);
-    EXPECT_EQ(turn_sign({-3e38f, -3e38f}, {3e38f, 3e38f}, {step, step}), 0);
-    EXPECT_EQ(turn_sign({0.1f, 0.1f}, {0.3f, 0.3f}, {0.7f, 0.7f}), 0);
+    EXPECT_EQ(turn_sign(Point2{0, 0}, Point2{3e38f, 3e38f},
+                        Point2{3e38f, std::nextafter(3e38f, infinity)}),
+              1);
+    EXPECT_EQ(turn_sign(Point2{-3e38f, -3e38f}, Point2{3e38f, 3e38f}, Point2{step, 0}), -1);
+    EXPECT_EQ(turn_sign(Point2{-3e38f, -3e38f}, Point2{3e38f, 3e38f}, Point2{step, step}), 0);
+    EXPECT_EQ(turn_sign(Point2{0.1f, 0.1f}, Point2{0.3f, 0.3f}, Point2{0.7f, 0.7f}), 0);
 }
 
 TEST(ExactSign, TurnsAreThoseOfIntegers) {
@@ -90,7 +93,7 @@ TEST(ExactSign, TurnsAreThoseOfIntegers) {
         const int expected = sign((whole(b.x) - whole(a.x)) * (whole(c.y) - whole(a.y)) -
                                   (whole(b.y) - whole(a.y)) * (whole(c.x) - whole(a.x)));
         zeros += expected == 0;
-        ASSERT_EQ(turn_sign(a, b, c), expected) << "seed " << seed << " case " << i;
+        ASSERT_EQ(turn_sign(a, b, c), expected) << "seed " << exact_sign_seed << " case " << i;
         ASSERT_EQ(turn_sign(c, b, a), -expected);
     }
     EXPECT_GT(zeros, 10000);

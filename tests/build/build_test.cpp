@@ -52,7 +52,7 @@ TEST(BuildMany, AreTheTreesOfEachMesh) {
     const std::vector<MeshView> broken(meshes.begin(), meshes.end());
     EXPECT_EQ(test::message_of([&] { static_cast<void>(build_many(broken, {})); }).substr(0, 23),
               "mesh 123: triangle 0: i");
-    EXPECT_TRUE(build_many({}, {}).empty());
+    EXPECT_TRUE(build_many(std::span<const MeshView>(), {}).empty());
 }
 
 TEST(BuildBvh, IndexPastTheVerticesNamesTheTriangle) {

@@ -27,7 +27,7 @@ namespace {
 
 using test::message_of;
 
-constexpr std::uint64_t seed = 20061113;
+constexpr std::uint64_t refit_seed = 20061113;
 constexpr float nan = std::numeric_limits<float>::quiet_NaN();
 constexpr const char* whole_builders[] = {"karras", "lauterbach", "garanzha", "apetrei",
                                           "ploc",   "hploc",      "binned",   "sweep"};
@@ -42,7 +42,7 @@ Mesh deformed(Mesh mesh, float by) {
 }
 
 std::vector<Ray> rays_at(const Aabb& box, std::size_t count) {
-    std::mt19937_64 random(seed);
+    std::mt19937_64 random(refit_seed);
     const auto unit = [&] { return static_cast<float>(random() >> 40) * 0x1p-24f; };
     const auto place = [&] {
         const Vec3 size = box.hi - box.lo;
@@ -94,13 +94,13 @@ TEST(Refit, GivesTheHitsOfANewTree) {
 }
 
 TEST(Refit, QualityTellsWhenATreeHasGoneBad) {
-    Mesh mesh = test::random_soup(5000, seed);
+    Mesh mesh = test::random_soup(5000, refit_seed);
     Bvh bvh = build_bvh(mesh, {.builder = Builder::binned});
     const Refitter refitter(bvh);
     EXPECT_NEAR(refitter.refit(bvh, mesh).ratio, 1.0, 1e-9);
     for (Vec3& p : mesh.vertices) p = p + Vec3{1000, -500, 1};
     EXPECT_NEAR(refitter.refit(bvh, mesh).ratio, 1.0, 0.01) << "moved as a whole";
-    std::mt19937_64 random(seed);
+    std::mt19937_64 random(refit_seed);
     for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {  // each to another's place
         const std::size_t j = random() % mesh.triangles.size();
         for (std::size_t k = 0; k < 3; ++k)
@@ -113,7 +113,7 @@ TEST(Refit, QualityTellsWhenATreeHasGoneBad) {
 
 TEST(Refit, BoxesAndPointsAndFewOfThem) {
     for (const std::size_t n : {0u, 1u, 2u, 5u, 1000u}) {
-        std::mt19937_64 random(seed);
+        std::mt19937_64 random(refit_seed);
         const auto unit = [&] { return static_cast<float>(random() >> 40) * 0x1p-24f; };
         std::vector<Aabb> boxes, later;
         std::vector<Vec3> points, moved;
@@ -160,7 +160,7 @@ TEST(Refit, BoxesAndPointsAndFewOfThem) {
 
 TEST(Refit, IsSavedAndLoadedAsWhatItIs) {
     const test::TempFolder folder;
-    const Mesh mesh = test::random_soup(2000, seed), now = deformed(mesh, 1.0f);
+    const Mesh mesh = test::random_soup(2000, refit_seed), now = deformed(mesh, 1.0f);
     const auto file = folder.path() / "tree.rdx";
     for (const char* builder : whole_builders)
         for (const bool strict : {false, true}) {
@@ -189,7 +189,7 @@ TEST(Refit, IsSavedAndLoadedAsWhatItIs) {
 
 /// Everything but the order of the codes still holds, and is looked at.
 TEST(Refit, CheckFindsWhatIsWrongWithARefittedTree) {
-    const Mesh mesh = test::random_soup(500, seed), now = deformed(mesh, 1.0f);
+    const Mesh mesh = test::random_soup(500, refit_seed), now = deformed(mesh, 1.0f);
     Bvh good = build_bvh(mesh);
     refit(good, now);
     ASSERT_EQ(check(good, now).broken, "");
@@ -216,7 +216,7 @@ TEST(Refit, CheckFindsWhatIsWrongWithARefittedTree) {
 
 TEST(Refit, ATreeFromAFileGetsMemoryOfItsOwn) {
     const test::TempFolder folder;
-    const Mesh mesh = test::random_soup(2000, seed), now = deformed(mesh, 0.5f);
+    const Mesh mesh = test::random_soup(2000, refit_seed), now = deformed(mesh, 0.5f);
     Model scene;
     scene.mesh() = mesh;
     const auto file = folder.path() / "tree.rdx";
@@ -229,7 +229,7 @@ TEST(Refit, ATreeFromAFileGetsMemoryOfItsOwn) {
 }
 
 TEST(Refit, RefusesWhatDoesNotFit) {
-    const Mesh mesh = test::random_soup(500, seed);
+    const Mesh mesh = test::random_soup(500, refit_seed);
     Bvh bvh = build_bvh(mesh);
     const std::string hash = tree_hash(bvh);
     const auto refused = [&](const Mesh& other) {

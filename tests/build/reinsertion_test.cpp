@@ -21,7 +21,7 @@
 namespace raydix::test {
 namespace {
 
-constexpr std::uint64_t seed = 20180501;
+constexpr std::uint64_t reinsertion_seed = 20180501;
 constexpr bool few = thorough == 1;
 constexpr Builder builders[] = {
     Builder::karras, Builder::lauterbach, Builder::garanzha, Builder::apetrei, Builder::ploc,
@@ -55,7 +55,7 @@ TEST_P(Reinserted, TreesAreValidAndCostNoMore) {
 }
 
 TEST_P(Reinserted, TreeDoesNotDependOnThreads) {
-    const Mesh mesh = random_soup(30'000, seed, 0.2f);
+    const Mesh mesh = random_soup(30'000, reinsertion_seed, 0.2f);
     const std::string one = tree_hash(build_bvh(mesh, options(4, 1)));
     for (const int threads : {2, 8})
         EXPECT_EQ(tree_hash(build_bvh(mesh, options(4, threads))), one) << threads << " threads";
@@ -65,15 +65,15 @@ TEST_P(Reinserted, TreeDoesNotDependOnThreads) {
 TEST_P(Reinserted, HitsAreThoseOfBruteForce) {
     for (const Model& scene : builtin_triangle_scenes(few ? 500 : 2000)) {
         const Bvh tree = build_bvh(scene.mesh(), options(5));
-        const std::vector<Ray> rays = make_mixed_rays(scene, 100 * thorough, seed);
+        const std::vector<Ray> rays = make_mixed_rays(scene, 100 * thorough, reinsertion_seed);
         const std::vector<Hit> expected = trace_brute_force(scene.mesh(), rays);
         const std::vector<Hit> hits = trace(tree, rays);
         const std::vector<Hit> wide = trace(build_wide_bvh(scene.mesh(), options(5)), rays);
         for (std::size_t i = 0; i < rays.size(); ++i) {
             ASSERT_EQ(std::memcmp(&hits[i], &expected[i], sizeof(Hit)), 0)
-                << scene.name << ", ray " << i << ", seed " << seed;
+                << scene.name << ", ray " << i << ", seed " << reinsertion_seed;
             ASSERT_EQ(std::memcmp(&wide[i], &expected[i], sizeof(Hit)), 0)
-                << scene.name << ", ray " << i << ", seed " << seed;
+                << scene.name << ", ray " << i << ", seed " << reinsertion_seed;
         }
     }
 }
@@ -81,7 +81,7 @@ TEST_P(Reinserted, HitsAreThoseOfBruteForce) {
 TEST_P(Reinserted, AnyBoxesGiveAValidTree) {
     BvhBuilder builder;  // one memory for all of them
     Bvh tree;
-    for (const BoxInput& input : cluster_inputs(seed)) {
+    for (const BoxInput& input : cluster_inputs(reinsertion_seed)) {
         builder.build(input.boxes, options(3), tree);
         const CheckReport valid = check(tree);
         EXPECT_TRUE(valid.ok) << input.name << ": " << valid.broken;
@@ -91,8 +91,9 @@ TEST_P(Reinserted, AnyBoxesGiveAValidTree) {
 TEST_P(Reinserted, FewBrokenHugeAndEqualTriangles) {
     constexpr float nan = std::numeric_limits<float>::quiet_NaN();
     for (const std::size_t n : {0, 1, 2, 3, 5, 100}) {
-        Mesh mesh = random_soup(n, seed + n);
-        const std::string what = std::to_string(n) + " triangles, seed " + std::to_string(seed + n);
+        Mesh mesh = random_soup(n, reinsertion_seed + n);
+        const std::string what =
+            std::to_string(n) + " triangles, seed " + std::to_string(reinsertion_seed + n);
         EXPECT_TRUE(check(build_bvh(mesh.triangles.empty() ? Mesh{} : mesh, options(2)),
                           mesh.triangles.empty() ? Mesh{} : mesh)
                         .ok)
@@ -110,7 +111,7 @@ TEST_P(Reinserted, FewBrokenHugeAndEqualTriangles) {
 }
 
 TEST_P(Reinserted, FilesKeepTheNumberOfRounds) {
-    const Model scene = scene_of(random_soup(500, seed, 0.2f), "soup");
+    const Model scene = scene_of(random_soup(500, reinsertion_seed, 0.2f), "soup");
     const Bvh tree = build_bvh(scene.mesh(), options(7));
     const auto file = std::filesystem::path(testing::TempDir()) /
                       ("reinserted-" + std::string(builder_name(GetParam())) + ".rdx");
@@ -136,7 +137,7 @@ TEST(ReinsertionOption, QualityWordsBringTheirs) {
 }
 
 TEST(ReinsertionOption, IsAnErrorOutOfRange) {
-    const Mesh mesh = random_soup(10, seed);
+    const Mesh mesh = random_soup(10, reinsertion_seed);
     for (const int rounds : {-1, 256}) {
         BuildOptions options;
         options.reinsertion_rounds = rounds;

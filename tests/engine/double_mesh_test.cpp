@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "engine/double_world.h"
 #include "support/double_scenes.h"
 #include "support/sanitized.h"
 #include "support/support.h"
@@ -55,18 +56,6 @@ std::vector<RayD> with_extremes(const std::vector<RayD>& rays) {
         other.tmax = other.tmax / by;
         out.push_back(other);
     }
-    return out;
-}
-
-/// Those that end, or begin, where they hit, or do both.
-std::vector<RayD> rays_to_hits(std::span<const RayD> rays, std::span<const HitD> hits) {
-    std::vector<RayD> out;
-    for (std::size_t i = 0; i < rays.size(); ++i)
-        for (int k = 0; hits[i].hit() && k < 3; ++k) {
-            out.push_back(rays[i]);
-            if (k != 1) out.back().tmax = hits[i].t;
-            if (k != 0) out.back().tmin = hits[i].t;
-        }
     return out;
 }
 

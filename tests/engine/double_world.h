@@ -17,11 +17,10 @@
 #include "engine/box_hits.h"
 #include "proximity/shape_hits.h"
 #include "support/double_scenes.h"
+#include "support/support.h"
 #include "trace/ray_frame.h"
 
 namespace raydix::test {
-
-inline constexpr std::uint32_t every_mask = 0xFFFFFFFFu;
 
 /// A scene and what is in it.
 struct WorldD {

@@ -18,7 +18,7 @@
 namespace raydix::test {
 namespace {
 
-constexpr std::uint64_t seed = 41;
+constexpr std::uint64_t extent_seed = 41;
 constexpr double error_of_meshes = 0x1p-18, error_of_shapes = 0x1p-44;
 
 Transform rounded(const Matrix& m) {
@@ -106,7 +106,7 @@ Column on_line(const WideRayLine& line, Real t) {
 /// A line goes inward as rays do. Its point inside, moved by what a hit may be off there, and
 /// mapped outward without rounding, is as near to the line outside as the image says.
 TEST(Extent, ErrorsOfChainsAreHeld) {
-    RandomMaps random(seed);
+    RandomMaps random(extent_seed);
     std::size_t by_product = 0;
     double tightest = 0;
     for (std::size_t i = 0; i < 500 * thorough; ++i) {
@@ -183,7 +183,7 @@ TransformD in_double(const Transform& t) {
 
 /// The same in double: a point inside, mapped outward, is as near to the line as its image says.
 TEST(Extent, ErrorsOfChainsAreHeldInDouble) {
-    RandomMaps random(seed);
+    RandomMaps random(extent_seed);
     double tightest = 0;
     for (std::size_t i = 0; i < 300 * thorough; ++i) {
         const std::vector<Transform> chain = random_chain(random);
@@ -311,7 +311,7 @@ TEST(Extent, MapsThatAreAlmostFlatAreRefused) {
 
 /// The t of a ray from far away is rounded: its point lies before or behind the flat box.
 TEST(Extent, HitsOfAMeshLieWithinItsOwn) {
-    RandomMaps random(seed);
+    RandomMaps random(extent_seed);
     Mesh square;
     square.vertices = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}};
     square.triangles = {{0, 1, 2}, {0, 2, 3}};
@@ -343,7 +343,7 @@ TEST(Extent, HitsOfAMeshLieWithinItsOwn) {
 
 /// Or every ray would visit them all.
 TEST(Extent, HarmlessNestsHaveNoWildParts) {
-    RandomMaps random(seed);
+    RandomMaps random(extent_seed);
     const std::uint32_t levels = thorough > 1 ? 14 : 9;
     const auto turned = nested_world(random, levels, 2, turned_copies(random));
     const auto halves = nested_world(random, levels, 2, half);
@@ -357,7 +357,7 @@ TEST(Extent, HarmlessNestsHaveNoWildParts) {
 
 /// Rays that begin near what they hit, or far away, beside a look at everything.
 TEST(Extent, NestsLoseNoHit) {
-    RandomMaps random(seed);
+    RandomMaps random(extent_seed);
     const auto turned = nested_world(random, 8, 2, turned_copies(random));
     const auto halves = nested_world(random, 8, 2, half);
     for (const World* const world : {turned.get(), halves.get()}) {

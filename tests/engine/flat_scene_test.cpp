@@ -29,7 +29,7 @@
 namespace raydix::test {
 namespace {
 
-constexpr std::uint64_t seed = 20260301;
+constexpr std::uint64_t flat_scene_seed = 20260301;
 constexpr float nan_value = std::numeric_limits<float>::quiet_NaN();
 
 Mesh box_mesh(Vec3 lo, Vec3 hi) {
@@ -93,9 +93,10 @@ template <class Body>
 void for_random_worlds(const Body& body) {
     for (std::uint32_t levels = 0; levels < 4; ++levels)
         for (int k = 0; k < 6; k += sanitized ? 2 : 1) {
-            RandomScenes random(seed + 100 * levels + static_cast<std::uint64_t>(k));
-            SCOPED_TRACE("levels " + std::to_string(levels) + ", seed " +
-                         std::to_string(seed + 100 * levels + static_cast<std::uint64_t>(k)));
+            RandomScenes random(flat_scene_seed + 100 * levels + static_cast<std::uint64_t>(k));
+            SCOPED_TRACE(
+                "levels " + std::to_string(levels) + ", seed " +
+                std::to_string(flat_scene_seed + 100 * levels + static_cast<std::uint64_t>(k)));
             Recipe recipe{levels, 1 + random.below(5), k % 3 == 0 ? 100.0f : 0.0f};
             recipe.options.quality = k % 2 == 0 ? Quality::fast : Quality::balanced;
             recipe.options.usage = k % 4 < 2 ? Usage::fixed : Usage::moving;
@@ -175,7 +176,7 @@ TEST(SceneSolid, IsTheSolidOfTheFlatMesh) {
         }
     };
     for (int k = 0; k < 8; ++k) {
-        RandomScenes random(seed + static_cast<std::uint64_t>(k));
+        RandomScenes random(flat_scene_seed + static_cast<std::uint64_t>(k));
         compare(*world_of_boxes(random, static_cast<std::uint32_t>(k) % 4), random);
     }
     for_random_worlds(compare);
@@ -329,7 +330,7 @@ TEST(ScenePairs, AreThoseOfTheFlatMesh) {
     std::size_t within = 0, between = 0;
     std::shared_ptr<World> before;
     for (std::uint32_t k = 0; k < fewer(20, 3); ++k) {
-        RandomScenes random(seed + k);
+        RandomScenes random(flat_scene_seed + k);
         const auto world = k % 5 == 4 ? world_of_boxes(random, 2)
                                       : random_world(random, {k % 4, 2 + random.below(4), 0});
         for (const std::uint32_t mask : {every_mask, 4u}) {
@@ -341,7 +342,7 @@ TEST(ScenePairs, AreThoseOfTheFlatMesh) {
                 const ScenePairs all = overlapping_pairs(world->scene, options);
                 const Pairs& found = all.pairs;
                 EXPECT_EQ(all.first.triangles, flat.names.size());
-                EXPECT_EQ(found, wanted) << "seed " << seed + k;
+                EXPECT_EQ(found, wanted) << "seed " << flat_scene_seed + k;
                 EXPECT_TRUE(std::ranges::is_sorted(found));
                 for (const ScenePair& pair : found) EXPECT_LT(pair.first, pair.second);
                 EXPECT_EQ(count_overlapping_pairs(world->scene, options), wanted.size());
@@ -464,7 +465,7 @@ TEST(SceneSolid, WhatDoesNotFitIsRefusedBeforeItIsMade) {
 }
 
 TEST(SceneSolid, InDoubleNothingIsRounded) {
-    Random random(seed);
+    Random random(flat_scene_seed);
     MeshD box;
     const Mesh in_floats = box_mesh({0, 0, 0}, {1, 1, 1});
     for (const Vec3 v : in_floats.vertices) box.vertices.push_back({v.x, v.y, v.z});

@@ -25,8 +25,6 @@
 
 namespace raydix::test {
 
-inline constexpr std::uint32_t every_mask = 0xFFFFFFFFu;
-
 class RandomScenes : public Random {
 public:
     using Random::Random;

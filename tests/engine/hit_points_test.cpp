@@ -49,7 +49,7 @@ struct World {
     }
 };
 
-class Random : public test::Random {
+class RandomPlaces : public test::Random {
 public:
     using test::Random::Random;
     std::uint32_t below(std::size_t n) {
@@ -85,7 +85,7 @@ struct Recipe {
 };
 
 /// Ids have holes.
-World random_world(Random& random, const Recipe& recipe, int level = 0) {
+World random_world(RandomPlaces& random, const Recipe& recipe, int level = 0) {
     World world;
     std::vector<World> inner;
     if (level < recipe.levels)
@@ -140,7 +140,7 @@ Real off_normal(const Placed& on, const Hit& hit, Vec3 normal) {
     return off(normal, wanted, {slack, slack, slack});
 }
 
-void expect_right(World& world, Random& random, int count) {
+void expect_right(World& world, RandomPlaces& random, int count) {
     std::vector<Hit> hits;
     std::vector<const Placed*> on;
     for (int i = 0; i < count; ++i) {
@@ -171,7 +171,7 @@ TEST(HitPoints, AreThoseOfMapsInLongDouble) {
                 for (const Usage usage : {Usage::fixed, Usage::moving}) {
                     SCOPED_TRACE("start " + std::to_string(start) + " levels " +
                                  std::to_string(levels) + " shear " + std::to_string(shear));
-                    Random random(start * 1000 + static_cast<std::uint64_t>(levels));
+                    RandomPlaces random(start * 1000 + static_cast<std::uint64_t>(levels));
                     World world = random_world(random, {levels, shear, usage});
                     expect_right(world, random, 900);
                 }
@@ -179,7 +179,7 @@ TEST(HitPoints, AreThoseOfMapsInLongDouble) {
 
 /// Paths of all instances are equally long here, and of one they are not.
 TEST(HitPoints, FindsAnyPath) {
-    Random random(7);
+    RandomPlaces random(7);
     World leaf, row, uneven;
     leaf.add(test::random_soup(3, 1));
     leaf.scene.commit();
@@ -200,7 +200,7 @@ TEST(HitPoints, FindsAnyPath) {
 }
 
 TEST(HitPoints, LieWhereRaysHit) {
-    Random random(11);
+    RandomPlaces random(11);
     const World world = random_world(random, {2, 1});
     std::vector<Ray> rays;
     for (int i = 0; i < 4000; ++i) {
@@ -226,7 +226,7 @@ TEST(HitPoints, MirrorsKeepTheOutsideOutside) {
     Mesh box;
     test::add_box(box, {-1, -1, -1}, {1, 1, 1});
     Scene inner(box);
-    Random random(3);
+    RandomPlaces random(3);
     std::size_t mirrored = 0;
     for (int k = 0; k < 40; ++k) {
         const Transform one = random.transform(10), two = random.transform(1);
@@ -260,7 +260,7 @@ TEST(HitPoints, MirrorsKeepTheOutsideOutside) {
 }
 
 TEST(HitPoints, AreTheSameForEveryThreadCount) {
-    Random random(5);
+    RandomPlaces random(5);
     World world = random_world(random, {2, 100});
     std::vector<Hit> hits;
     for (int i = 0; i < 30'000; ++i)

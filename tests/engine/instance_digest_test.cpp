@@ -23,7 +23,7 @@
 namespace raydix::test {
 namespace {
 
-constexpr std::uint64_t seed = 12;
+constexpr std::uint64_t instance_digest_seed = 12;
 constexpr std::size_t ray_count = 1000, rays_to_hits = 150;
 
 struct InFloat {
@@ -99,7 +99,8 @@ public:
         }
         for (const MeshD& mesh : layout_.meshes)
             trees_.push_back(build_bvh(Kind::mesh(mesh), {.builder = Builder::karras}));
-        rays_ = Kind::rays(digest_rays(some_triangles(layout_, 20), ray_count, seed));
+        rays_ =
+            Kind::rays(digest_rays(some_triangles(layout_, 20), ray_count, instance_digest_seed));
         see_by_masks();
         add_rays_to_hits(rays_, closest_of_each_alone(), rays_to_hits);
         see_by_masks();

@@ -27,7 +27,7 @@
 namespace raydix::test {
 namespace {
 
-constexpr std::uint64_t seed = 20151102;
+constexpr std::uint64_t instance_edges_seed = 20151102;
 constexpr double inf = std::numeric_limits<double>::infinity();
 
 /// Turned, stretched, sheared; mirrored every other time. `flat` < 1: the last row is the first but
@@ -75,7 +75,7 @@ HitD look_at_all(const std::vector<Shown>& all, const RayD& ray, std::uint32_t m
 class Nest {
 public:
     Nest(Vec3d place, double reach, double flat, std::size_t count) {
-        RandomD random(seed);
+        RandomD random(instance_edges_seed);
         for (const MeshD& mesh :
              {random_soup_d(200, 1, 0.5), in_double(ball_mesh({0, 0, 0}), 0.01)}) {
             trees_.push_back(build_bvh(mesh, {.builder = Builder::sbvh, .max_leaf = 1}));
@@ -133,7 +133,7 @@ private:
 };
 
 std::vector<RayD> rays_around(Vec3d place, double reach, std::size_t count) {
-    RandomD random(seed + 1);
+    RandomD random(instance_edges_seed + 1);
     const auto near = [&](double r) { return place + r * random.direction(); };
     std::vector<RayD> rays;
     for (std::size_t i = 0; i < count; ++i) {
@@ -154,7 +154,7 @@ void expect_every_instance(const char* name, Vec3d place, double reach, double f
     const Nest nest(place, reach, flat, sanitized ? 20 : 60);
     ASSERT_GT(nest.all().size(), sanitized ? 30u : 100u);
     const std::vector<RayD> rays = rays_around(place, reach, 180 + 60 * thorough);
-    RandomD random(seed);
+    RandomD random(instance_edges_seed);
     std::vector<std::uint32_t> masks;
     std::vector<HitD> expected;
     std::size_t hits = 0;
@@ -208,7 +208,7 @@ MeshD unit_cube() {
 /// scene, where a box ends with the cube: rounding inside decides whether they hit, and the box
 /// must not know better.
 TEST(InstanceEdges, RaysFromFarAwayAtTheCornersOfBoxes) {
-    RandomD random(seed);
+    RandomD random(instance_edges_seed);
     constexpr std::uint32_t half = 20;
     const BvhD tree = build_bvh(unit_cube());
     const SceneD cube(unit_cube());
@@ -300,7 +300,7 @@ TEST(InstanceEdges, StandForTheMeshTheyMake) {
 
 /// Inverses in rational arithmetic, of maps that are nearly flat and of any size.
 TEST(InstanceEdges, InversesAreRightToTheLastDigits) {
-    RandomD random(seed);
+    RandomD random(instance_edges_seed);
     double worst = 0;
     for (std::size_t i = 0; i < 100 * thorough; ++i) {
         TransformD t = random_transform(random, utm_place, 10,
@@ -334,7 +334,7 @@ TEST(InstanceEdges, InversesAreRightToTheLastDigits) {
 /// The point that a ray has at t inside, mapped back without rounding, is within what the box of
 /// the instance allows: this is what culling rests on.
 TEST(InstanceEdges, BoxesHoldWhatRoundingMoves) {
-    RandomD random(seed);
+    RandomD random(instance_edges_seed);
     for (std::size_t i = 0; i < 100 * thorough; ++i) {
         const double flat = std::ldexp(1.0, -static_cast<int>(random.below(36)));
         const AffineD a = affine_of(random_transform(random, utm_place, 10, flat));
@@ -389,7 +389,7 @@ TEST(InstanceEdges, BoxesHoldWhatRoundingMoves) {
 /// Two hundred instances that all move: the same as a scene made for their new places.
 TEST(InstanceEdges, ManyThatMove) {
     const SceneD ball(in_double(ball_mesh({0, 0, 0})));
-    RandomD random(seed);
+    RandomD random(instance_edges_seed);
     SceneD scene, made_new;
     const auto anywhere = [&] { return random_transform(random, utm_place, 1e3); };
     for (int i = 0; i < 200; ++i) scene.add(ball, anywhere());
@@ -418,7 +418,7 @@ Transform turned_any_way(test::Random& random, float reach) {
 /// A direction of few bits that is shorter by a power of two, and has no more bits as a float, hits
 /// what it did, later by that power.
 TEST(InstanceEdges, SubnormalDirectionsKeepTheirWay) {
-    test::Random random(seed);
+    test::Random random(instance_edges_seed);
     const Scene soup(scaled(random_soup(300, 7), 1e-7f));
     Scene scene;
     for (int i = 0; i < 8; ++i) scene.add(soup, turned_any_way(random, 1e-7f));

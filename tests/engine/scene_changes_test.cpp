@@ -26,7 +26,7 @@
 namespace raydix::test {
 namespace {
 
-constexpr Ray down{{0.25f, 0.25f, 10}, 0, {0, 0, -1}};
+constexpr Ray down_on_changes{{0.25f, 0.25f, 10}, 0, {0, 0, -1}};
 
 TEST(SceneChanges, ChangesInAnyOrderEqualASceneMadeAfresh) {
     for (std::uint64_t seed = 0; seed < 3 * thorough; ++seed) {
@@ -309,8 +309,9 @@ TEST(SceneChanges, LimitsOfNesting) {
         next.commit();
         scenes.push_back(std::move(next));
     }
-    EXPECT_EQ(closest_hit(scenes.back(), down).instance, Scene::max_levels);
-    EXPECT_EQ(trace(scenes.back(), std::vector<Ray>(40, down))[7].instance, Scene::max_levels);
+    EXPECT_EQ(closest_hit(scenes.back(), down_on_changes).instance, Scene::max_levels);
+    EXPECT_EQ(trace(scenes.back(), std::vector<Ray>(40, down_on_changes))[7].instance,
+              Scene::max_levels);
     Scene deeper;
     deeper.add(scenes.back(), Transform{});
     EXPECT_THROW(deeper.commit(), InputError);

@@ -301,7 +301,7 @@ TEST(UserShapes, KeepTheirNumbersWhereSomeAreLeftOutAndOthersMove) {
     }
 }
 
-constexpr Ray down{{0.25f, 0.25f, 10}, 0, {0, 0, -1}};
+constexpr Ray down_at_corner{{0.25f, 0.25f, 10}, 0, {0, 0, -1}};
 constexpr Aabb unit_box{{0, 0, 0}, {1, 1, 1}};
 
 TEST(UserShapes, WhatTheirFunctionThrowsComesOutOfTheCall) {
@@ -317,7 +317,7 @@ TEST(UserShapes, WhatTheirFunctionThrowsComesOutOfTheCall) {
         for (const int threads : {1, 2})
             for (const SimdPath path : {SimdPath::automatic, SimdPath::single, SimdPath::packet,
                                         SimdPath::stream, SimdPath::sorted}) {
-                const std::vector<Ray> rays(n, down);
+                const std::vector<Ray> rays(n, down_at_corner);
                 SceneTraceOptions options;
                 options.threads = threads, options.path = path;
                 EXPECT_THROW(static_cast<void>(trace(scene, rays, options)), Stop);
@@ -325,8 +325,8 @@ TEST(UserShapes, WhatTheirFunctionThrowsComesOutOfTheCall) {
                 EXPECT_THROW(trace_any(scene, rays, occluded, options), Stop);
                 EXPECT_THROW(static_cast<void>(trace_all(scene, rays, options)), Stop);
             }
-    EXPECT_THROW(static_cast<void>(closest_hit(scene, down)), Stop);
-    EXPECT_THROW(static_cast<void>(any_hit(scene, down)), Stop);
+    EXPECT_THROW(static_cast<void>(closest_hit(scene, down_at_corner)), Stop);
+    EXPECT_THROW(static_cast<void>(any_hit(scene, down_at_corner)), Stop);
     // Nothing of it is left behind.
     Scene other(random_soup(500, 2));
     RandomScenes random(3);
@@ -342,11 +342,11 @@ TEST(UserShapes, HitsOutsideTheRayAreNone) {
         Ray ray;
         bool hits;
     };
-    const Ray ends{down.origin, 2, down.direction, 9.5f};
-    for (const Case& c :
-         {Case{9.5f, down, true}, Case{nan, down, false}, Case{-1, down, false},
-          Case{infinity, down, false}, Case{9.5f, ends, true}, Case{9.6f, ends, false},
-          Case{1.9f, ends, false}, Case{-0.0f, down, true}, Case{2, ends, true}}) {
+    const Ray ends{down_at_corner.origin, 2, down_at_corner.direction, 9.5f};
+    for (const Case& c : {Case{9.5f, down_at_corner, true}, Case{nan, down_at_corner, false},
+                          Case{-1, down_at_corner, false}, Case{infinity, down_at_corner, false},
+                          Case{9.5f, ends, true}, Case{9.6f, ends, false}, Case{1.9f, ends, false},
+                          Case{-0.0f, down_at_corner, true}, Case{2, ends, true}}) {
         Scene scene;
         // A box that the ray is in all the way.
         const Aabb box{{0, 0, -5}, {1, 1, 20}};
@@ -404,7 +404,7 @@ TEST(Shapes, OfRadiusNothingAndManyEqualOnes) {
     scene.add(std::span<const Sphere>(
         std::vector<Sphere>(sanitized ? 2000 : 1000000, Sphere{{3, 3, 0}, 0.5f})));
     scene.commit();
-    const Hit point = closest_hit(scene, down);
+    const Hit point = closest_hit(scene, down_at_corner);
     EXPECT_EQ(point.t, 9);
     EXPECT_EQ(point.geometry, 0u);
     const Ray at_spheres{{3, 3, 10}, 0, {0, 0, -1}};
@@ -428,14 +428,14 @@ TEST(Shapes, ThatAreNoneAreLeftOut) {
     const CommitReport report = scene.commit();
     EXPECT_EQ(report.shapes, 2u);
     EXPECT_EQ(report.primitives, 5u);
-    const Hit hit = closest_hit(scene, down);
+    const Hit hit = closest_hit(scene, down_at_corner);
     EXPECT_EQ(hit.prim, 4u);
     EXPECT_EQ(hit.geometry, 1u);
     Scene none;
     none.add(std::span<const Sphere>(bad).first(4));
     none.commit();
-    EXPECT_FALSE(closest_hit(none, down).hit());
-    EXPECT_FALSE(trace(none, std::vector<Ray>(100, down))[99].hit());
+    EXPECT_FALSE(closest_hit(none, down_at_corner).hit());
+    EXPECT_FALSE(trace(none, std::vector<Ray>(100, down_at_corner))[99].hit());
     EXPECT_FALSE(none.bounds().lo.x <= none.bounds().hi.x);
 }
 

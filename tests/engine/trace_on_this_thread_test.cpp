@@ -17,7 +17,7 @@
 namespace raydix {
 namespace {
 
-const SceneTree& tree_of(const Scene& scene) { return *SceneInternals::tree(scene); }
+const SceneTree& tree_below(const Scene& scene) { return *SceneInternals::tree(scene); }
 
 /// All in one direction, all from one place, or neither.
 enum class Kind { packet, stream, apart };
@@ -68,11 +68,11 @@ TEST(TraceHere, AnswersAsBatchesDo) {
                 const std::vector<Ray> rays = rays_of(kind, count);
                 const std::vector<Hit> wanted = trace(scenes[s], rays);
                 std::vector<Hit> hits(count);
-                closest_on_this_thread(tree_of(scenes[s]), rays, hits);
+                closest_on_this_thread(tree_below(scenes[s]), rays, hits);
                 EXPECT_EQ(std::memcmp(hits.data(), wanted.data(), count * sizeof(Hit)), 0) << s;
                 std::vector<std::uint8_t> expected(count), found(count);
                 trace_any(scenes[s], rays, expected);
-                occluded_on_this_thread(tree_of(scenes[s]), rays, found);
+                occluded_on_this_thread(tree_below(scenes[s]), rays, found);
                 EXPECT_EQ(found, expected) << s;
             }
 }
@@ -85,7 +85,7 @@ TEST(TraceHere, CountsTheNodesOfOneTree) {
         const WideBvh wide =
             build_wide_bvh(mesh, build_options_for(Quality::balanced), {.compact = compact});
         std::vector<std::uint32_t> visits(rays.size());
-        count_steps_on_this_thread(tree_of(scene), rays, visits);
+        count_steps_on_this_thread(tree_below(scene), rays, visits);
         std::vector<Hit> hits(rays.size());
         // Rays in turn take children in the order of single calls, whatever vectors do it; but for
         // three or more of which a ray enters some at the same place.
@@ -113,9 +113,9 @@ TEST(TraceHere, CountsNodesAboveTheTreesToo) {
     above.add(below, far);
     above.commit();
     std::vector<std::uint32_t> one(rays.size()), two(rays.size()), three(rays.size());
-    count_steps_on_this_thread(tree_of(alone), rays, one);
-    count_steps_on_this_thread(tree_of(below), rays, two);
-    count_steps_on_this_thread(tree_of(above), rays, three);
+    count_steps_on_this_thread(tree_below(alone), rays, one);
+    count_steps_on_this_thread(tree_below(below), rays, two);
+    count_steps_on_this_thread(tree_below(above), rays, three);
     std::size_t entered = 0;
     for (std::size_t i = 0; i < rays.size(); ++i) {
         if (one[i] < 2) continue;
@@ -125,7 +125,7 @@ TEST(TraceHere, CountsNodesAboveTheTreesToo) {
     }
     EXPECT_GT(entered, 100u);
     std::vector<std::uint32_t> none(rays.size(), 7);
-    count_steps_on_this_thread(tree_of(Scene(Mesh{})), rays, none);
+    count_steps_on_this_thread(tree_below(Scene(Mesh{})), rays, none);
     EXPECT_EQ(std::accumulate(none.begin(), none.end(), 0u), 0u);
 }
 

@@ -24,7 +24,7 @@
 namespace raydix::test {
 namespace {
 
-constexpr std::uint64_t seed = 12;
+constexpr std::uint64_t user_geometry_digest_seed = 12;
 constexpr std::size_t ray_count = 4000, rays_to_hits = 500, shape_count = 300;
 
 struct FloatCalls {
@@ -89,7 +89,7 @@ struct TestShapes {
     std::vector<typename Calls::Box> boxes;
     std::function<bool(std::uint32_t prim, const AnyRay& ray, AnyHit& hit)> intersect;
 
-    explicit TestShapes(const std::string& name) : random_(seed) {
+    explicit TestShapes(const std::string& name) : random_(user_geometry_digest_seed) {
         if (name.starts_with("far")) middle_ = utm_place;
         if (name == "my boxes") {
             make_boxes();
@@ -159,7 +159,7 @@ public:
     explicit Traced(const std::string& name) : shapes_(name) {
         std::vector<AabbD> wide;
         for (const auto& box : shapes_.boxes) wide.push_back(Calls::wide(box));
-        rays_ = Calls::rays(digest_rays(across(wide), ray_count, seed));
+        rays_ = Calls::rays(digest_rays(across(wide), ray_count, user_geometry_digest_seed));
         add_rays_to_hits(rays_, trace(*scene(true, Quality::fast), rays_), rays_to_hits);
     }
 

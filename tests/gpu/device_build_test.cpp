@@ -126,13 +126,6 @@ void expect_same_everywhere(const std::string& what, const Input& input) {
     });
 }
 
-/// Every k-th vertex is NaN.
-Mesh laced(Mesh mesh, std::size_t k) {
-    for (std::size_t i = 0; i < mesh.vertices.size(); i += k)
-        mesh.vertices[i].y = i % 2 == 0 ? std::nanf("") : infinity;
-    return mesh;
-}
-
 TEST(DeviceBuild, FewPrimitivesValidAndNot) {
     const float nan = std::nanf("");
     const std::size_t most = sanitized ? 2 : 10;

@@ -20,7 +20,7 @@
 namespace raydix::test {
 namespace {
 
-constexpr std::uint64_t seed = 2012;
+constexpr std::uint64_t device_queries_seed = 2012;
 constexpr const char* device_builders[] = {"karras", "lauterbach", "garanzha", "apetrei", "hploc"};
 
 /// Calls with(launcher) for the loops of the host and for shuffled ones.
@@ -33,7 +33,7 @@ void with_launchers(std::uint64_t order_seed, const With& with) {
 }
 
 std::vector<PointSet> all_point_sets() {
-    std::vector<PointSet> sets = point_sets(15 * thorough, seed);
+    std::vector<PointSet> sets = point_sets(15 * thorough, device_queries_seed);
     sets.push_back({"all equal", std::vector<Vec3>(400, Vec3{1, -2, 3})});
     return sets;
 }
@@ -41,7 +41,8 @@ std::vector<PointSet> all_point_sets() {
 TEST(DeviceQueries, NearestPointsAreThoseOfTheIndex) {
     std::size_t rows = 0;
     for (const PointSet& set : all_point_sets()) {
-        const std::vector<Vec3> queries = queries_for(set.points, 10 + 2 * thorough, seed + 1);
+        const std::vector<Vec3> queries =
+            queries_for(set.points, 10 + 2 * thorough, device_queries_seed + 1);
         const Points index = build_points(set.points);
         for (const int max_leaf : {1, 8, 40}) {
             const KdTree tree =
@@ -49,7 +50,7 @@ TEST(DeviceQueries, NearestPointsAreThoseOfTheIndex) {
             for (const std::uint32_t k : {1u, 2u, 7u, 8u, 33u, 64u, 200u}) {
                 SCOPED_TRACE(set.name + ", " + std::to_string(set.points.size()) + " points, k " +
                              std::to_string(k) + ", leaves of " + std::to_string(max_leaf) +
-                             ", seed " + std::to_string(seed));
+                             ", seed " + std::to_string(device_queries_seed));
                 const NearestPoints<float> wanted = knn(index, queries, k);
                 with_launchers(k, [&](auto& launcher) {
                     GuardedArray<std::uint32_t> indices(queries.size() * k);
@@ -66,7 +67,7 @@ TEST(DeviceQueries, NearestPointsAreThoseOfTheIndex) {
             }
         }
     }
-    std::cout << rows << " rows compared, seed " << seed << "\n";
+    std::cout << rows << " rows compared, seed " << device_queries_seed << "\n";
 }
 
 template <class Launcher>
@@ -90,7 +91,8 @@ void expect_radius(Launcher& launcher, const KdTree& tree, std::span<const Vec3>
 TEST(DeviceQueries, PointsWithinARadiusAreThoseOfTheIndex) {
     std::uint64_t found = 0;
     for (const PointSet& set : all_point_sets()) {
-        const std::vector<Vec3> queries = queries_for(set.points, 10 + 2 * thorough, seed + 2);
+        const std::vector<Vec3> queries =
+            queries_for(set.points, 10 + 2 * thorough, device_queries_seed + 2);
         const Points index = build_points(set.points);
         const KdTree tree = build_kdtree(std::span<const Vec3>(set.points));
         const Aabb box = index.bounds();
@@ -101,7 +103,7 @@ TEST(DeviceQueries, PointsWithinARadiusAreThoseOfTheIndex) {
                 const PointLists<float> wanted =
                     radius_search(index, queries, radius, {.sort = by_distance});
                 found += wanted.counts.found;
-                with_launchers(seed, [&](auto& launcher) {
+                with_launchers(device_queries_seed, [&](auto& launcher) {
                     expect_radius(launcher, tree, queries, radius, wanted, by_distance);
                 });
             }
@@ -130,7 +132,7 @@ TEST(DeviceQueries, RowsThatDoNotFitAreLeftAsTheyAre) {
 }
 
 std::vector<Vec3> queries_around(const Mesh& mesh, std::size_t count) {
-    std::vector<Vec3> queries = queries_for(mesh.vertices, count, seed + 3);
+    std::vector<Vec3> queries = queries_for(mesh.vertices, count, device_queries_seed + 3);
     for (std::size_t i = 0; i < std::min<std::size_t>(count, mesh.triangles.size()); ++i) {
         const Triangle& t = mesh.triangles[i];
         queries.push_back(0.5f * (mesh.vertices[t[0]] + mesh.vertices[t[1]]));  // ties of two
@@ -147,7 +149,7 @@ void expect_closest(const std::string& name, const Mesh& mesh, std::size_t count
             std::vector<ClosestPoint> wanted(queries.size());
             const QueryCounts counts =
                 closest_points(bvh, queries, wanted, {.max_distance = reach});
-            with_launchers(seed, [&](auto& launcher) {
+            with_launchers(device_queries_seed, [&](auto& launcher) {
                 GuardedArray<ClosestPoint> results(queries.size());
                 std::uint32_t invalid = 0;
                 check_closest(host_primitives(bvh), queries, reach, results.span().size());
@@ -162,7 +164,7 @@ void expect_closest(const std::string& name, const Mesh& mesh, std::size_t count
 TEST(DeviceQueries, ClosestPointsAreThoseOfTheHost) {
     for (const Model& scene : builtin_triangle_scenes(100 * thorough))
         expect_closest(scene.name, scene.mesh(), 10 * thorough);
-    expect_closest("lattice", lattice_mesh(20 * thorough, 5, seed), 20 * thorough);
+    expect_closest("lattice", lattice_mesh(20 * thorough, 5, device_queries_seed), 20 * thorough);
     for (const std::size_t n : {0u, 1u, 2u, 5u})
         expect_closest(std::to_string(n) + " triangles", random_soup(n, n + 1), 20);
     Mesh laced = random_soup(100, 5);
@@ -193,7 +195,7 @@ void expect_all_pairs(const std::string& name, const Bvh& a, const Bvh& b, bool 
                                      cross = overlapping_pairs(a, b, {.narrow = narrow});
     std::cout << name << (narrow ? ", narrow: " : ": ") << self.size() << " within, "
               << cross.size() << " between\n";
-    with_launchers(seed, [&](auto& launcher) {
+    with_launchers(device_queries_seed, [&](auto& launcher) {
         expect_pairs(launcher, {.a = host_primitives(a), .narrow = narrow}, self);
         expect_pairs(
             launcher,
@@ -207,11 +209,14 @@ TEST(DeviceQueries, PairsAreThoseOfTheHost) {
     Mesh laced = random_soup(n, 9, 0.2f);
     for (std::size_t i = 0; i < laced.vertices.size(); i += 11) laced.vertices[i].z = infinity;
     const std::pair<std::string, Mesh> meshes[] = {
-        {"soup", random_soup(n, seed, 0.2f)}, {"lattice", lattice_mesh(n / 4, 6, seed)},
-        {"ball", ball_mesh({0, 0, 0})},       {"some left out", laced},
-        {"one", random_soup(1, 1)},           {"none", random_soup(0, 1)}};
+        {"soup", random_soup(n, device_queries_seed, 0.2f)},
+        {"lattice", lattice_mesh(n / 4, 6, device_queries_seed)},
+        {"ball", ball_mesh({0, 0, 0})},
+        {"some left out", laced},
+        {"one", random_soup(1, 1)},
+        {"none", random_soup(0, 1)}};
     const Bvh other = build_bvh(moved(ball_mesh({0, 0, 0}), {60, 10, -20}), {.max_leaf = 1});
-    const Bvh soup = build_bvh(random_soup(n, seed + 1, 0.1f), {.max_leaf = 7});
+    const Bvh soup = build_bvh(random_soup(n, device_queries_seed + 1, 0.1f), {.max_leaf = 7});
     for (const auto& [name, mesh] : meshes)
         for (const char* builder : device_builders) {
             const Bvh a = build_bvh(mesh, {.builder = builder_from_name(builder)});

@@ -22,7 +22,7 @@
 namespace raydix::test {
 namespace {
 
-constexpr std::uint64_t seed = 1609;
+constexpr std::uint64_t device_scene_seed = 1609;
 constexpr std::uint32_t all = 0xFFFFFFFFu;
 
 struct Item {
@@ -59,7 +59,7 @@ void expect_named(const MeshNames& names, const std::vector<TreeHit>& found,
     };
     HostLauncher<> host;
     launched(host);
-    ShuffledLauncher shuffled(seed);
+    ShuffledLauncher shuffled(device_scene_seed);
     launched(shuffled);
 }
 
@@ -67,11 +67,12 @@ std::size_t compare(const std::string& what, const Scene& scene, std::size_t ray
     const MergedMeshes whole = merge_meshes(scene, all);
     std::vector<Ray> rays = make_mixed_rays(
         scene_of(whole.mesh.triangles.empty() ? random_soup(3, 1) : whole.mesh, what), ray_count,
-        seed);
+        device_scene_seed);
     if (rays.size() > 2) rays[1].direction = {0, 0, 0};
     std::size_t hits = 0;
     for (const std::uint32_t mask : {all, 1u, 6u, 0u}) {
-        SCOPED_TRACE(what + ", mask " + std::to_string(mask) + ", seed " + std::to_string(seed));
+        SCOPED_TRACE(what + ", mask " + std::to_string(mask) + ", seed " +
+                     std::to_string(device_scene_seed));
         const MergedMeshes merged = merge_meshes(scene, mask);
         const std::vector<Hit> wanted = trace(scene, rays, {.mask = mask});
         expect_named(merged.names, tree_hits(merged, rays), wanted);
@@ -83,7 +84,7 @@ std::size_t compare(const std::string& what, const Scene& scene, std::size_t ray
 TEST(DeviceScene, HitsAreThoseOfTheScene) {
     Mesh laced = random_soup(120, 4, 0.4f);
     for (std::size_t i = 0; i < laced.vertices.size(); i += 7) laced.vertices[i].x = std::nanf("");
-    const Mesh lattice = lattice_mesh(60, 3, seed);
+    const Mesh lattice = lattice_mesh(60, 3, device_scene_seed);
     const std::vector<std::pair<std::string, std::vector<Item>>> cases = {
         {"nothing", {}},
         {"no triangles", {{Mesh()}, {Mesh()}}},
@@ -140,7 +141,7 @@ TEST(DeviceScene, SimulatedHitsNameTheirTriangles) {
     const Scene scene = committed(items);
     const MergedMeshes merged = merge_meshes(scene);
     const std::vector<Ray> rays =
-        make_rays(scene_of(merged.mesh, "soups"), RaySet::through_box, 2000, seed);
+        make_rays(scene_of(merged.mesh, "soups"), RaySet::through_box, 2000, device_scene_seed);
     const WarpTree tree(build_bvh(merged.mesh));
     const SimulateOptions run{.kernel = WarpKernel::speculative_while_while,
                               .machine = machine_model("h200")};

@@ -23,13 +23,6 @@ struct Case {
     Mesh mesh;
 };
 
-/// Every k-th vertex is not finite.
-Mesh laced(Mesh mesh, std::size_t k) {
-    for (std::size_t i = 0; i < mesh.vertices.size(); i += k)
-        mesh.vertices[i].y = i % 2 == 0 ? std::nanf("") : infinity;
-    return mesh;
-}
-
 Mesh points_only(std::vector<Vec3> points) {
     Mesh mesh;
     mesh.vertices = std::move(points);

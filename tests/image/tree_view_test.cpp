@@ -25,7 +25,7 @@ bool inside(const Aabb& box, Vec3 p) {
            p.z >= box.lo.z && p.z <= box.hi.z;
 }
 
-Vec3 at(const Picture& picture, std::uint32_t x, std::uint32_t y) {
+Vec3 pixel_at(const Picture& picture, std::uint32_t x, std::uint32_t y) {
     return picture.pixels[std::size_t{y} * picture.width + x];
 }
 float light(Vec3 p) { return p.x + p.y + p.z; }
@@ -97,20 +97,20 @@ TEST(RenderSlice, ShowsDeeperBoxesInFrontAndTheCutOfTheScene) {
         {{{0, 0, 0}, {8, 6, 4}}, 0}, {{{4, 0, 0}, {8, 6, 4}}, 1}, {{{4, 3, 3.5f}, {8, 6, 4}}, 2}};
     SliceOptions options{.width = 200, .height = 150};
     const Picture middle = render_slice(bvh, boxes, options);
-    const float left = light(at(middle, 50, 75)), right = light(at(middle, 150, 110)),
-                upper = light(at(middle, 150, 40)), outside = light(at(middle, 1, 1));
+    const float left = light(pixel_at(middle, 50, 75)), right = light(pixel_at(middle, 150, 110)),
+                upper = light(pixel_at(middle, 150, 40)), outside = light(pixel_at(middle, 1, 1));
     EXPECT_LT(outside, left);
     EXPECT_LT(left, right);
     EXPECT_EQ(right, upper);  // the third box starts above the plane
     options.at = 0.95f;
     const Picture top = render_slice(bvh, boxes, options);
-    EXPECT_GT(light(at(top, 150, 40)), light(at(top, 150, 110)));
+    EXPECT_GT(light(pixel_at(top, 150, 40)), light(pixel_at(top, 150, 110)));
     // The walls of the box are cut: light lines at its frame, 3 % from the nearest border.
     const auto lightest = [](const Picture& picture, std::uint32_t width, std::uint32_t height) {
         float most = 0;
         for (std::uint32_t y = 0; y < height; ++y)
             for (std::uint32_t x = 0; x < width; ++x)
-                most = std::max(most, light(at(picture, x, y)));
+                most = std::max(most, light(pixel_at(picture, x, y)));
         return most;
     };
     EXPECT_GT(lightest(middle, 9, 150), 1.0f);
@@ -175,7 +175,7 @@ TEST(RenderTree, DrawsBoxesWhereTheyAre) {
     const Picture with = render_tree(bvh, front_camera(), {&box, 1}, options);
     // 2 / (10 tan 20 degrees) of half the screen: 55 pixels from the middle.
     const auto changed = [&](std::uint32_t x, std::uint32_t y) {
-        return light(at(with, x, y)) > light(at(without, x, y)) + 0.3f;
+        return light(pixel_at(with, x, y)) > light(pixel_at(without, x, y)) + 0.3f;
     };
     EXPECT_TRUE(changed(45, 100) || changed(46, 100));
     EXPECT_TRUE(changed(155, 100) || changed(154, 100));
@@ -195,7 +195,7 @@ TEST(RenderTree, LinesBehindSurfacesAreFainter) {
     const auto gain = [&](std::uint32_t x) {
         float most = 0;
         for (std::uint32_t y = 98; y < 104; ++y)
-            most = std::max(most, light(at(with, x, y)) - light(at(without, x, y)));
+            most = std::max(most, light(pixel_at(with, x, y)) - light(pixel_at(without, x, y)));
         return most;
     };
     EXPECT_GT(gain(60), 0.05f);
@@ -250,7 +250,7 @@ TEST(RenderTree, IsTheSameForEveryThreadCount) {
 }
 
 /// Pixels that differ by more than one level in a channel.
-std::size_t count_different(const Picture& a, const Picture& b) {
+std::size_t count_far_apart(const Picture& a, const Picture& b) {
     std::size_t count = 0;
     for (std::size_t i = 0; i < a.pixels.size(); ++i) {
         const auto apart = [](float x, float y) {
@@ -273,7 +273,7 @@ void expect_golden(const std::string& name, const Picture& picture) {
     const Picture now = load_picture(scratch.path() / name), golden = load_picture(golden_file);
     ASSERT_EQ(now.width, golden.width);
     ASSERT_EQ(now.height, golden.height);
-    EXPECT_LE(count_different(now, golden), now.pixels.size() / 1000);
+    EXPECT_LE(count_far_apart(now, golden), now.pixels.size() / 1000);
 }
 
 TEST(TreeView, GoldenPictures) {

@@ -240,9 +240,9 @@ TEST_F(Rdx, FlipsUnderRightChecksumsAreSurvived) {
 }
 
 /// A file after `change` of the header or of one section, with right checksums.
-class Liar {
+class LiarOfTrees {
 public:
-    explicit Liar(Bytes bytes) : bytes_(std::move(bytes)) {}
+    explicit LiarOfTrees(Bytes bytes) : bytes_(std::move(bytes)) {}
 
     template <class T>
     T* at(rdx::SectionId id, std::size_t i) {
@@ -262,64 +262,70 @@ private:
     Bytes bytes_;
 };
 
-using Lie = LieOf<Liar>;
+using TreeLie = LieOf<LiarOfTrees>;
 
-std::vector<Lie> lies_in_content() {
+std::vector<TreeLie> lies_in_content() {
     return {
         {"x.rdx: nodes: inner node",  // the children of the root's left child are the root's
-         [](Liar& l) {
+         [](LiarOfTrees& l) {
              l.at<BvhNode>(rdx::nodes, 2)->first = l.at<BvhNode>(rdx::nodes, 0)->first;
          }},
         {"x.rdx: nodes: inner node 0 has its children at slot 4294967294 of",
-         [](Liar& l) { l.at<BvhNode>(rdx::nodes, 0)->first = 0xFFFFFFFEu; }},
+         [](LiarOfTrees& l) { l.at<BvhNode>(rdx::nodes, 0)->first = 0xFFFFFFFEu; }},
         {"x.rdx: nodes: leaf 0 holds 4294967295 primitives",
-         [](Liar& l) { l.at<BvhNode>(rdx::nodes, 0)->count = 0xFFFFFFFFu; }},
+         [](LiarOfTrees& l) { l.at<BvhNode>(rdx::nodes, 0)->count = 0xFFFFFFFFu; }},
         {"x.rdx: nodes: the box of inner node 0",
-         [](Liar& l) { l.at<BvhNode>(rdx::nodes, 0)->hi.x = 1e12f; }},
+         [](LiarOfTrees& l) { l.at<BvhNode>(rdx::nodes, 0)->hi.x = 1e12f; }},
         {"x.rdx: order: position 5 names primitive 4294967295 of 100",
-         [](Liar& l) { *l.at<std::uint32_t>(rdx::order, 5) = 0xFFFFFFFFu; }},
+         [](LiarOfTrees& l) { *l.at<std::uint32_t>(rdx::order, 5) = 0xFFFFFFFFu; }},
         {"x.rdx: order: primitive",
-         [](Liar& l) {
+         [](LiarOfTrees& l) {
              *l.at<std::uint32_t>(rdx::order, 5) = *l.at<std::uint32_t>(rdx::order, 6);
          }},
         {"x.rdx: primitives: the one at position 3 belongs in no tree",
-         [](Liar& l) { l.at<LeafTriangle>(rdx::primitives, 3)->v0.x = std::nanf(""); }},
+         [](LiarOfTrees& l) { l.at<LeafTriangle>(rdx::primitives, 3)->v0.x = std::nanf(""); }},
         {"x.rdx: primitives: the one at position",
-         [](Liar& l) { l.at<Vec3>(rdx::vertices, 9)->x += 1; }},
+         [](LiarOfTrees& l) { l.at<Vec3>(rdx::vertices, 9)->x += 1; }},
         {"x.rdx: triangles: triangle 7 has the vertices",
-         [](Liar& l) { (*l.at<Triangle>(rdx::triangles, 7))[2] = 300; }},
+         [](LiarOfTrees& l) { (*l.at<Triangle>(rdx::triangles, 7))[2] = 300; }},
         {"x.rdx: info: depth 4294967295 claimed",
-         [](Liar& l) { l.at<rdx::Info>(rdx::info, 0)->max_depth = 0xFFFFFFFFu; }},
+         [](LiarOfTrees& l) { l.at<rdx::Info>(rdx::info, 0)->max_depth = 0xFFFFFFFFu; }},
         {"x.rdx: nodes:",
-         [](Liar& l) { l.at<rdx::Info>(rdx::info, 0)->inner_count = 0xFFFFFFFFu; }},
+         [](LiarOfTrees& l) { l.at<rdx::Info>(rdx::info, 0)->inner_count = 0xFFFFFFFFu; }},
         {"x.rdx: info: 1099511627776 primitives",
-         [](Liar& l) { l.at<rdx::Info>(rdx::info, 0)->input_count = std::uint64_t{1} << 40; }},
-        {"x.rdx: info: primitive kind 3", [](Liar& l) { l.at<rdx::Info>(rdx::info, 0)->kind = 3; }},
+         [](LiarOfTrees& l) {
+             l.at<rdx::Info>(rdx::info, 0)->input_count = std::uint64_t{1} << 40;
+         }},
+        {"x.rdx: info: primitive kind 3",
+         [](LiarOfTrees& l) { l.at<rdx::Info>(rdx::info, 0)->kind = 3; }},
         {"x.rdx: primitives: elements of 36 bytes",
-         [](Liar& l) { l.at<rdx::Info>(rdx::info, 0)->kind = 1; }},
-        {"x.rdx: info: flags are 4", [](Liar& l) { l.at<rdx::Info>(rdx::info, 0)->flags = 4; }},
+         [](LiarOfTrees& l) { l.at<rdx::Info>(rdx::info, 0)->kind = 1; }},
+        {"x.rdx: info: flags are 4",
+         [](LiarOfTrees& l) { l.at<rdx::Info>(rdx::info, 0)->flags = 4; }},
         {"x.rdx: info: builder number 10",
-         [](Liar& l) { l.at<rdx::Info>(rdx::info, 0)->builder = 10; }},
+         [](LiarOfTrees& l) { l.at<rdx::Info>(rdx::info, 0)->builder = 10; }},
         {"x.rdx: info: -1 code bits",
-         [](Liar& l) { l.at<rdx::Info>(rdx::info, 0)->bits = 0xFFFFFFFFu; }},
+         [](LiarOfTrees& l) { l.at<rdx::Info>(rdx::info, 0)->bits = 0xFFFFFFFFu; }},
         {"x.rdx: info: a picture of 4294967295 x 480",
-         [](Liar& l) { l.at<rdx::Info>(rdx::info, 0)->picture_width = 0xFFFFFFFFu; }},
+         [](LiarOfTrees& l) { l.at<rdx::Info>(rdx::info, 0)->picture_width = 0xFFFFFFFFu; }},
         {"x.rdx: names: a name of 4294967295 bytes",
-         [](Liar& l) { l.at<rdx::Info>(rdx::info, 0)->scene_name_bytes = 0xFFFFFFFFu; }},
+         [](LiarOfTrees& l) { l.at<rdx::Info>(rdx::info, 0)->scene_name_bytes = 0xFFFFFFFFu; }},
         {"x.rdx: names: a name of 77 bytes",
-         [](Liar& l) { l.at<rdx::Camera>(rdx::cameras, 1)->name_bytes = 77; }},
+         [](LiarOfTrees& l) { l.at<rdx::Camera>(rdx::cameras, 1)->name_bytes = 77; }},
         {"x.rdx: names: 2 bytes belong to no name",
-         [](Liar& l) { l.at<rdx::Camera>(rdx::cameras, 0)->name_bytes -= 2; }},
+         [](LiarOfTrees& l) { l.at<rdx::Camera>(rdx::cameras, 0)->name_bytes -= 2; }},
         {"x.rdx: cameras: camera 0 is not finite",
-         [](Liar& l) { l.at<rdx::Camera>(rdx::cameras, 0)->up.y = infinity; }},
+         [](LiarOfTrees& l) { l.at<rdx::Camera>(rdx::cameras, 0)->up.y = infinity; }},
         {"x.rdx: cameras: camera 1 has the angle 0",
-         [](Liar& l) { l.at<rdx::Camera>(rdx::cameras, 1)->vfov = 0; }},
+         [](LiarOfTrees& l) { l.at<rdx::Camera>(rdx::cameras, 1)->vfov = 0; }},
     };
 }
 
-std::vector<Lie> lies_in_header() {
+std::vector<TreeLie> lies_in_header() {
     const auto section = [](rdx::SectionId id, std::function<void(rdx::Section&)> change) {
-        return [=](Liar& l) { l.change_header([&](rdx::Header& h) { change(h.sections[id]); }); };
+        return [=](LiarOfTrees& l) {
+            l.change_header([&](rdx::Header& h) { change(h.sections[id]); });
+        };
     };
     return {
         {"x.rdx: nodes: 1099511627776 elements of 32 bytes, but",
@@ -338,9 +344,9 @@ std::vector<Lie> lies_in_header() {
          section(rdx::nodes, [](auto& s) { s.element_bytes = 31; })},
         {"x.rdx: nodes: number 1", section(rdx::info, [](auto& s) { s.count = 2; })},
         {"x.rdx: header: 9 sections",
-         [](Liar& l) { l.change_header([](auto& h) { h.section_count = 9; }); }},
+         [](LiarOfTrees& l) { l.change_header([](auto& h) { h.section_count = 9; }); }},
         {"x.rdx: header: the reserved bytes",
-         [](Liar& l) { l.change_header([](auto& h) { h.reserved[23] = 1; }); }},
+         [](LiarOfTrees& l) { l.change_header([](auto& h) { h.reserved[23] = 1; }); }},
     };
 }
 

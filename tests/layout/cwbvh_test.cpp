@@ -23,7 +23,7 @@
 namespace raydix::test {
 namespace {
 
-constexpr std::uint64_t seed = 80;
+constexpr std::uint64_t cwbvh_seed = 80;
 
 /// Quotients of long doubles do not round here: sizes are within 2^60 of each other.
 using Exact = long double;
@@ -31,7 +31,7 @@ using Exact = long double;
 Exact step_of(int exponent) { return std::ldexp(Exact{1}, exponent - 127); }
 
 TEST(Cwbvh, StepsAreTheNearestOutward) {
-    std::mt19937_64 random(seed);
+    std::mt19937_64 random(cwbvh_seed);
     std::uint64_t tight = 0;
     for (int turn = 0; turn < 200'000; ++turn) {
         const auto number = [&] {
@@ -89,7 +89,7 @@ double gain_of(std::span<const Aabb> boxes, std::span<const int> slots) {
 }
 
 TEST(Cwbvh, OctantSlotsAreTheBestOfAllAssignments) {
-    std::mt19937_64 random(seed);
+    std::mt19937_64 random(cwbvh_seed);
     const auto unit = [&] { return static_cast<float>(random() >> 40) * 0x1p-24f; };
     for (const std::size_t count : {1u, 2u, 3u, 5u, 8u})
         for (int turn = 0; turn < (sanitized ? 2 : count == 8 ? 4 : 20); ++turn) {

@@ -33,7 +33,7 @@ constexpr float nan = std::numeric_limits<float>::quiet_NaN();
 bool same_bytes(const auto& a, const auto& b) {
     return std::ranges::equal(std::as_bytes(std::span(a)), std::as_bytes(std::span(b)));
 }
-bool same_bits(const WideBvh& a, const WideBvh& b) {
+bool same_tree(const WideBvh& a, const WideBvh& b) {
     return same_bytes(a.arrays().nodes.view(), b.arrays().nodes.view()) &&
            same_bytes(a.arrays().blocks.view(), b.arrays().blocks.view());
 }
@@ -163,7 +163,7 @@ TEST(SortedWide, IsTheSameForEveryThreadCount) {
         const WideBvh one = build_wide_bvh(mesh, fast(1));
         for (const int threads : {2, 5}) {
             const WideBvh many = build_wide_bvh(mesh, fast(threads));
-            EXPECT_TRUE(same_bits(one, many)) << name;
+            EXPECT_TRUE(same_tree(one, many)) << name;
             EXPECT_EQ(one.stats().sah, many.stats().sah) << name;
         }
     }

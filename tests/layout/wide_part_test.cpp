@@ -17,7 +17,7 @@
 namespace raydix::test {
 namespace {
 
-constexpr std::uint64_t seed = 20170727;
+constexpr std::uint64_t wide_part_seed = 20170727;
 
 /// `nodes` nodes, the first with a leaf, a node of the part and missing children; blocks of ids.
 std::unique_ptr<WidePart> make_part(std::uint32_t k, std::uint32_t nodes, std::uint32_t blocks,
@@ -119,7 +119,7 @@ TEST(PartPlacer, PutsPartsBehindEachOtherInAnyOrder) {
     const Placed expected = in_order();
     std::vector<std::uint32_t> order(part_count);
     std::iota(order.begin(), order.end(), 0);
-    std::mt19937_64 random(seed);
+    std::mt19937_64 random(wide_part_seed);
     for (const bool compact : {false, true})
         for (const std::size_t references : {0, 900, 100000}) {  // none, half, enough
             PartPool pool;

@@ -19,6 +19,7 @@
 
 #include "exec/memory.h"
 #include "limits/memory_end.h"
+#include "support/double_scenes.h"
 #include "support/sanitized.h"
 #include "support/support.h"
 
@@ -89,18 +90,9 @@ Mesh stack_of_triangles(std::uint32_t n) {
     return mesh;
 }
 
-struct MeshInDouble {
-    std::vector<Vec3d> vertices;
-    std::vector<Triangle> triangles;
-};
-MeshInDouble in_double(const Mesh& mesh) {
-    MeshInDouble out{{}, mesh.triangles};
-    for (const Vec3 v : mesh.vertices) out.vertices.push_back({v.x, v.y, v.z});
-    return out;
-}
 BvhD build_in_double(const Mesh& mesh, const BuildOptions& options = {}) {
-    const MeshInDouble d = in_double(mesh);
-    return build_bvh(MeshViewD(d.vertices, d.triangles), options);
+    const MeshD d = test::in_double(mesh);
+    return build_bvh(d, options);
 }
 
 /// A call with a limit and a number of threads -> a number that its result decides.

@@ -13,6 +13,7 @@
 #include <string>
 
 #include "exec/memory.h"
+#include "support/double_scenes.h"
 #include "support/sanitized.h"
 #include "support/support.h"
 
@@ -36,12 +37,6 @@ BasicScene<Scalar> scene_of_copies(const AnyMesh& mesh, int copies, Quality qual
     }
     scene.commit({.quality = quality});
     return scene;
-}
-
-MeshD in_double(const Mesh& mesh) {
-    MeshD out{"", {}, mesh.triangles};
-    for (const Vec3 v : mesh.vertices) out.vertices.push_back({v.x, v.y, v.z});
-    return out;
 }
 
 /// Holds the call to what it says: all that it needs or, unless `exact`, that it needs more.
@@ -75,7 +70,7 @@ TEST(SceneLimits, BodiesTakeNoMoreThanTheySay) {
     for (const Quality quality : {Quality::fast, Quality::balanced}) {
         const std::string which = quality == Quality::fast ? ", fast" : ", balanced";
         const Scene many = scene_of_copies<float>(mesh, 6, quality);
-        const SceneD in_doubles = scene_of_copies<double>(in_double(mesh), 6, quality);
+        const SceneD in_doubles = scene_of_copies<double>(test::in_double(mesh), 6, quality);
         const Scene one(mesh, {.quality = quality});
         for (const InsideRule rule : {InsideRule::crossings, InsideRule::winding}) {
             const std::string name =

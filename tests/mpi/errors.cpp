@@ -31,17 +31,16 @@ std::vector<Vec3> some_points(std::size_t n) {
     return points;
 }
 
-int last() { return ranks() - 1; }
-
 TEST(ErrorsOverRanks, ARankThatThrowsIsNamedOnAll) {
     const auto points = some_points(20);
     Options options;
     options.strict = true;
     auto bad = points;
-    if (rank() == last()) bad[4].y = infinity;
+    if (rank() == last_rank()) bad[4].y = infinity;
     const std::string message =
         message_of<InputError>([&] { const DistributedPoints made(MPI_COMM_WORLD, bad, options); });
-    EXPECT_TRUE(begins_with(message, "rank " + std::to_string(last()) + ": point 4 of this rank"))
+    EXPECT_TRUE(
+        begins_with(message, "rank " + std::to_string(last_rank()) + ": point 4 of this rank"))
         << message;
     // The communicator still works.
     const DistributedPoints made(MPI_COMM_WORLD, points, options);
@@ -51,11 +50,12 @@ TEST(ErrorsOverRanks, ARankThatThrowsIsNamedOnAll) {
 TEST(ErrorsOverRanks, AMeshWithAWrongIndexIsNamedOnAll) {
     Mesh mesh;
     mesh.vertices = some_points(3);
-    mesh.triangles = {{0, 1, rank() == last() ? 3u : 2u}};
+    mesh.triangles = {{0, 1, rank() == last_rank() ? 3u : 2u}};
     const MeshView view(mesh);
     const std::string message = message_of<InputError>(
         [&] { const DistributedScene made(MPI_COMM_WORLD, std::span(&view, 1)); });
-    EXPECT_TRUE(begins_with(message, "rank " + std::to_string(last()) + ": mesh 0, triangle 0"))
+    EXPECT_TRUE(
+        begins_with(message, "rank " + std::to_string(last_rank()) + ": mesh 0, triangle 0"))
         << message;
 }
 
@@ -63,8 +63,8 @@ TEST(ErrorsOverRanks, ResultsThatAreTooLargeAreRefusedOnAll) {
     const auto points = some_points(100);
     const DistributedPoints made(MPI_COMM_WORLD, points);
     QueryOptions options;
-    options.max_result_bytes = rank() == last() ? 1000 : 0;
-    const std::string start = "rank " + std::to_string(last()) + ": ";
+    options.max_result_bytes = rank() == last_rank() ? 1000 : 0;
+    const std::string start = "rank " + std::to_string(last_rank()) + ": ";
     std::string message = message_of<ResultTooLarge>([&] { (void)made.knn(points, 50, options); });
     EXPECT_TRUE(begins_with(message, start + "knn: the result needs 60000 bytes")) << message;
     message = message_of<ResultTooLarge>([&] { (void)made.radius(points, 2.0f, options); });
@@ -103,12 +103,13 @@ TEST(ErrorsOverRanks, ARankThatOnlyAnswersRefusesNoHits) {
 
 TEST(ErrorsOverRanks, RanksThatDifferAreFound) {
     const auto points = some_points(10);
-    const bool other = rank() == last() && ranks() > 1;
+    const bool other = rank() == last_rank() && ranks() > 1;
     const auto expect_difference = [&](const std::function<void()>& call) {
         if (ranks() == 1) return call();
         const std::string message = message_of<InputError>(call);
         EXPECT_TRUE(begins_with(message, "the ranks differ: rank 0 calls ")) << message;
-        EXPECT_NE(message.find(", rank " + std::to_string(last()) + " calls "), std::string::npos)
+        EXPECT_NE(message.find(", rank " + std::to_string(last_rank()) + " calls "),
+                  std::string::npos)
             << message;
     };
     expect_difference([&] {

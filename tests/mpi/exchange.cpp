@@ -29,8 +29,6 @@ std::vector<Bytes> to_last(std::size_t bytes) {
     return out;
 }
 
-int last() { return ranks() - 1; }
-
 TEST(ExchangeOverRanks, ARankWithoutMemoryForWhatComesIsNamedOnAll) {
 #ifdef RAYDIX_FINDS_LEAKS
     GTEST_SKIP() << "the address sanitizer ends a process that has no memory";
@@ -39,27 +37,28 @@ TEST(ExchangeOverRanks, ARankWithoutMemoryForWhatComesIsNamedOnAll) {
     const auto out = to_last(64 * megabyte / std::size_t(ranks()));
     try {
         std::optional<raydix::test::ResourceLimit> little;
-        if (rank() == last()) little.emplace(RLIMIT_AS, bytes_and(16 * megabyte));
+        if (rank() == last_rank()) little.emplace(RLIMIT_AS, bytes_and(16 * megabyte));
         (void)exchange(comm, out, megabyte);
         ADD_FAILURE() << "no error";
     } catch (const std::bad_alloc& error) {
         EXPECT_EQ(std::string(error.what()),
-                  "rank " + std::to_string(last()) + ": not enough memory");
+                  "rank " + std::to_string(last_rank()) + ": not enough memory");
     }
     const Arrived arrived = exchange(comm, out, megabyte);  // the communicator still works
-    EXPECT_EQ(arrived.all().size(),
-              rank() == last() ? 64 * megabyte / std::size_t(ranks()) * std::size_t(ranks()) : 0);
+    EXPECT_EQ(
+        arrived.all().size(),
+        rank() == last_rank() ? 64 * megabyte / std::size_t(ranks()) * std::size_t(ranks()) : 0);
 }
 
 TEST(ExchangeOverRanks, AnErrorOfARankIsThrownOnAll) {
     const Communicator comm(MPI_COMM_WORLD);
     std::exception_ptr error;
-    if (rank() == last()) error = std::make_exception_ptr(InputError("no"));
+    if (rank() == last_rank()) error = std::make_exception_ptr(InputError("no"));
     try {
         (void)exchange(comm, to_last(100), 7, error);
         ADD_FAILURE() << "no error";
     } catch (const InputError& thrown) {
-        EXPECT_EQ(std::string(thrown.what()), "rank " + std::to_string(last()) + ": no");
+        EXPECT_EQ(std::string(thrown.what()), "rank " + std::to_string(last_rank()) + ": no");
     }
 }
 

@@ -50,6 +50,8 @@ inline std::vector<std::size_t> division_of(std::size_t n, Division division, un
     return begins;
 }
 
+inline int last_rank() { return ranks() - 1; }
+
 /// This rank's part of a whole.
 template <class T>
 std::span<const T> mine(const std::vector<T>& whole, const std::vector<std::size_t>& begins) {

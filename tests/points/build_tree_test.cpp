@@ -15,7 +15,7 @@
 namespace raydix::test {
 namespace {
 
-constexpr std::uint64_t seed = 71;
+constexpr std::uint64_t build_tree_seed = 71;
 
 template <class Index>
 class PointTree : public ::testing::Test {};
@@ -112,7 +112,7 @@ private:
 };
 
 TYPED_TEST(PointTree, HoldsEachPointOnce) {
-    for (const PointSet& set : point_sets(300 * thorough, seed)) {
+    for (const PointSet& set : point_sets(300 * thorough, build_tree_seed)) {
         auto points = points_as<TypeParam>(set.points);
         if (points.size() > 5) points[5].x = -typename TypeParam::Scalar{0};
         for (const PointsTree tree : {PointsTree::automatic, PointsTree::kdtree, PointsTree::bvh}) {
@@ -145,7 +145,8 @@ TYPED_TEST(PointTree, DepthIsBoundedWhereCodesCollapse) {
 }
 
 TYPED_TEST(PointTree, MemoryIsCounted) {
-    const auto points = points_as<TypeParam>(point_sets(1000 * thorough, seed)[5].points);
+    const auto points =
+        points_as<TypeParam>(point_sets(1000 * thorough, build_tree_seed)[5].points);
     ASSERT_EQ(points.size(), 1000 * thorough);
     const TypeParam index = build_points(points);
     const auto& arrays = index.arrays();
@@ -157,7 +158,7 @@ TYPED_TEST(PointTree, MemoryIsCounted) {
 
 TYPED_TEST(PointTree, RebuildsInPlace) {
     TypeParam index;
-    const auto sets = point_sets(500 * thorough, seed);
+    const auto sets = point_sets(500 * thorough, build_tree_seed);
     const auto uniform = points_as<TypeParam>(sets[5].points);
     index.rebuild(uniform);
     index.rebuild(uniform);
@@ -185,7 +186,7 @@ TYPED_TEST(PointTree, RebuildsInPlace) {
 
 TYPED_TEST(PointTree, StrictNamesTheFirstInvalidPoint) {
     using T = typename TypeParam::Scalar;
-    auto points = points_as<TypeParam>(point_sets(100'000, seed)[5].points);
+    auto points = points_as<TypeParam>(point_sets(100'000, build_tree_seed)[5].points);
     const T inf = std::numeric_limits<T>::infinity();
     points[77'777].x = inf;
     points[90'000].y = static_cast<T>(-1.1e12f);

@@ -21,7 +21,7 @@
 namespace raydix::test {
 namespace {
 
-constexpr std::uint64_t seed = 71;
+constexpr std::uint64_t changing_points_seed = 71;
 
 template <class Index>
 class Changing : public ::testing::Test {};
@@ -148,9 +148,9 @@ void come_and_go(const std::vector<typename Index::Point>& points, Index index, 
 }
 
 TYPED_TEST(Changing, AnswersAreThoseOfAFreshIndex) {
-    std::cout << "seed " << seed << "\n";
-    std::mt19937_64 random(seed);
-    for (const PointSet& set : point_sets(900, seed)) {
+    std::cout << "seed " << changing_points_seed << "\n";
+    std::mt19937_64 random(changing_points_seed);
+    for (const PointSet& set : point_sets(900, changing_points_seed)) {
         SCOPED_TRACE(set.name);
         auto points = points_as<TypeParam>(set.points);
         if (points.size() > 20) points[7].x = std::numeric_limits<float>::quiet_NaN();
@@ -196,7 +196,7 @@ std::uint32_t expect_boxes_that_fit(const PointTreeView<float, 3>& tree, std::ui
 
 /// Whether one goes from the inside or from the border, all at once or each alone.
 TEST(ChangingPoints, BoxesFitWhatIsLeft) {
-    std::mt19937_64 random(seed);
+    std::mt19937_64 random(changing_points_seed);
     std::uniform_real_distribution<float> place(0, 1);
     std::vector<Vec3> points(5000);
     for (Vec3& p : points) p = {place(random), place(random), place(random)};
@@ -218,7 +218,7 @@ TEST(ChangingPoints, BoxesFitWhatIsLeft) {
 }
 
 TEST(ChangingPoints, TreesStayFew) {
-    std::mt19937_64 random(seed);
+    std::mt19937_64 random(changing_points_seed);
     std::uniform_real_distribution<float> place(0, 1);
     Points index;
     std::uint32_t deepest = 0;

@@ -16,7 +16,7 @@
 namespace raydix::test {
 namespace {
 
-constexpr std::uint64_t seed = 61;
+constexpr std::uint64_t knn_seed = 61;
 
 template <class Index>
 class Knn : public ::testing::Test {};
@@ -57,10 +57,10 @@ std::size_t differences(const NearestPoints<T>& a, const NearestPoints<T>& b) {
 
 TYPED_TEST(Knn, LikeEveryPoint) {
     std::size_t rows = 0;
-    for (const PointSet& set : point_sets(20 * thorough, seed)) {
+    for (const PointSet& set : point_sets(20 * thorough, knn_seed)) {
         const auto points = points_as<TypeParam>(set.points);
         const auto queries =
-            points_as<TypeParam>(queries_for(set.points, 20 + 2 * thorough, seed + 1));
+            points_as<TypeParam>(queries_for(set.points, 20 + 2 * thorough, knn_seed + 1));
         for (const std::uint32_t k : {1u, 2u, 8u, 9u, 16u, 17u, 32u, 33u, 1000u}) {
             const auto wanted = expected<TypeParam>(points, queries, k);
             for (const PointsTree tree : {PointsTree::kdtree, PointsTree::bvh}) {
@@ -69,7 +69,7 @@ TYPED_TEST(Knn, LikeEveryPoint) {
                     const auto found = knn(index, queries, k, {.isa = isa});
                     EXPECT_EQ(differences(found, wanted), 0u)
                         << set.name << ", " << points.size() << " points, k " << k << ", "
-                        << points_tree_name(tree) << ", " << isa << ", seed " << seed;
+                        << points_tree_name(tree) << ", " << isa << ", seed " << knn_seed;
                     EXPECT_EQ(found.counts.queries, queries.size());
                     EXPECT_EQ(found.counts.found, wanted.counts.found);
                     EXPECT_GE(found.counts.invalid_queries, 2u);
@@ -78,16 +78,16 @@ TYPED_TEST(Knn, LikeEveryPoint) {
             }
         }
     }
-    std::cout << rows << " rows compared, seed " << seed << "\n";
+    std::cout << rows << " rows compared, seed " << knn_seed << "\n";
 }
 
 TYPED_TEST(Knn, FarPointsDoNotCount) {
     using T = typename TypeParam::Scalar;
     std::size_t rows = 0, cut = 0;
-    for (const PointSet& set : point_sets(20 * thorough, seed + 8)) {
+    for (const PointSet& set : point_sets(20 * thorough, knn_seed + 8)) {
         const auto points = points_as<TypeParam>(set.points);
         const auto queries =
-            points_as<TypeParam>(queries_for(set.points, 20 + 2 * thorough, seed + 9));
+            points_as<TypeParam>(queries_for(set.points, 20 + 2 * thorough, knn_seed + 9));
         const TypeParam index = build_points(points);
         // A distance that is met is a limit that includes it.
         auto third = knn(index, queries, 3);
@@ -102,7 +102,7 @@ TYPED_TEST(Knn, FarPointsDoNotCount) {
                     const auto found = knn(index, queries, k, {.isa = isa, .max_distance = limit});
                     EXPECT_EQ(differences(found, wanted), 0u)
                         << set.name << ", " << points.size() << " points, k " << k << ", within "
-                        << limit << ", " << isa << ", seed " << seed + 8;
+                        << limit << ", " << isa << ", seed " << knn_seed + 8;
                     EXPECT_EQ(found.counts.found, wanted.counts.found);
                     rows += queries.size();
                 }
@@ -117,14 +117,14 @@ TYPED_TEST(Knn, FarPointsDoNotCount) {
             }
     }
     EXPECT_GT(cut, 20u);
-    std::cout << rows << " rows compared, seed " << seed + 8 << "\n";
+    std::cout << rows << " rows compared, seed " << knn_seed + 8 << "\n";
 }
 
 TYPED_TEST(Knn, ThreadsAndOrderChangeNothing) {
-    for (const PointSet& set : point_sets(200 * thorough, seed + 2)) {
+    for (const PointSet& set : point_sets(200 * thorough, knn_seed + 2)) {
         auto points = points_as<TypeParam>(set.points);
-        auto queries = points_as<TypeParam>(queries_for(set.points, 200 * thorough, seed + 3));
-        std::shuffle(queries.begin(), queries.end(), std::mt19937_64(seed));
+        auto queries = points_as<TypeParam>(queries_for(set.points, 200 * thorough, knn_seed + 3));
+        std::shuffle(queries.begin(), queries.end(), std::mt19937_64(knn_seed));
         const TypeParam index = build_points(points);
         const auto wanted = knn(index, queries, 8, {.threads = 1, .order = QueryOrder::as_given});
         for (const int threads : {1, 2, 7}) {
@@ -133,7 +133,7 @@ TYPED_TEST(Knn, ThreadsAndOrderChangeNothing) {
             for (const QueryOrder order :
                  {QueryOrder::automatic, QueryOrder::as_given, QueryOrder::sorted}) {
                 const auto found = knn(again, queries, 8, {.threads = threads, .order = order});
-                EXPECT_EQ(differences(found, wanted), 0u) << set.name << ", seed " << seed;
+                EXPECT_EQ(differences(found, wanted), 0u) << set.name << ", seed " << knn_seed;
                 EXPECT_EQ(found.counts.invalid_queries, wanted.counts.invalid_queries);
             }
         }
@@ -142,10 +142,10 @@ TYPED_TEST(Knn, ThreadsAndOrderChangeNothing) {
 
 TYPED_TEST(Knn, OneByOneLikeTheBatch) {
     using T = typename TypeParam::Scalar;
-    for (const PointSet& set : point_sets(20 * thorough, seed + 4)) {
+    for (const PointSet& set : point_sets(20 * thorough, knn_seed + 4)) {
         const TypeParam index = build_points(points_as<TypeParam>(set.points));
         const auto queries =
-            points_as<TypeParam>(queries_for(set.points, 20 + 2 * thorough, seed + 5));
+            points_as<TypeParam>(queries_for(set.points, 20 + 2 * thorough, knn_seed + 5));
         for (const std::uint32_t k : {1u, 5u, 20u, 50u}) {
             const auto batch = knn(index, queries, k);
             NearestPoints<T> single{

@@ -15,7 +15,7 @@
 namespace raydix::test {
 namespace {
 
-constexpr std::uint64_t seed = 67;
+constexpr std::uint64_t range_query_seed = 67;
 
 template <class Index>
 class Within : public ::testing::Test {};
@@ -54,9 +54,10 @@ bool is_row(const PointLists<T>& lists, std::size_t q, const std::vector<Near<T>
 TYPED_TEST(Within, RadiusLikeEveryPoint) {
     using T = typename TypeParam::Scalar;
     std::size_t rows = 0;
-    for (const PointSet& set : point_sets(20 * thorough, seed)) {
+    for (const PointSet& set : point_sets(20 * thorough, range_query_seed)) {
         const auto points = points_as<TypeParam>(set.points);
-        const auto queries = points_as<TypeParam>(queries_for(set.points, 20 + thorough, seed + 1));
+        const auto queries =
+            points_as<TypeParam>(queries_for(set.points, 20 + thorough, range_query_seed + 1));
         const EveryPoint<TypeParam> every(points);
         const std::vector<std::string> isas = point_instruction_sets();
         for (const PointsTree tree : {PointsTree::kdtree, PointsTree::bvh}) {
@@ -73,7 +74,8 @@ TYPED_TEST(Within, RadiusLikeEveryPoint) {
                         const auto wanted = every.within(queries[q], radius, sort);
                         ASSERT_TRUE(is_row(lists, q, wanted))
                             << set.name << ", query " << q << ", radius " << radius << ", "
-                            << points_tree_name(tree) << ", " << isa << ", seed " << seed;
+                            << points_tree_name(tree) << ", " << isa << ", seed "
+                            << range_query_seed;
                         ASSERT_EQ(counts[q], wanted.size());
                         ASSERT_EQ(radius_count(index, queries[q], radius), wanted.size());
                         ++rows;
@@ -84,15 +86,16 @@ TYPED_TEST(Within, RadiusLikeEveryPoint) {
             }
         }
     }
-    std::cout << rows << " rows compared, seed " << seed << "\n";
+    std::cout << rows << " rows compared, seed " << range_query_seed << "\n";
 }
 
 TYPED_TEST(Within, ARadiusForEachQuery) {
     using T = typename TypeParam::Scalar;
-    std::mt19937_64 random(seed);
-    for (const PointSet& set : point_sets(20 * thorough, seed + 2)) {
+    std::mt19937_64 random(range_query_seed);
+    for (const PointSet& set : point_sets(20 * thorough, range_query_seed + 2)) {
         const auto points = points_as<TypeParam>(set.points);
-        const auto queries = points_as<TypeParam>(queries_for(set.points, 700, seed + 3));
+        const auto queries =
+            points_as<TypeParam>(queries_for(set.points, 700, range_query_seed + 3));
         const EveryPoint<TypeParam> every(points);
         const std::vector<T> some = radii_for<TypeParam>(every, queries);
         std::vector<T> radii(queries.size());
@@ -109,9 +112,10 @@ TYPED_TEST(Within, ARadiusForEachQuery) {
 
 TYPED_TEST(Within, CallbacksMayStop) {
     using T = typename TypeParam::Scalar;
-    for (const PointSet& set : point_sets(20 * thorough, seed + 4)) {
+    for (const PointSet& set : point_sets(20 * thorough, range_query_seed + 4)) {
         const auto points = points_as<TypeParam>(set.points);
-        const auto queries = points_as<TypeParam>(queries_for(set.points, 20, seed + 5));
+        const auto queries =
+            points_as<TypeParam>(queries_for(set.points, 20, range_query_seed + 5));
         const EveryPoint<TypeParam> every(points);
         const TypeParam index = build_points(points);
         for (const T radius : radii_for<TypeParam>(every, queries))
@@ -148,9 +152,10 @@ TEST(Visitors, MayBeFunctions) {
 
 TYPED_TEST(Within, BoxLikeEveryPoint) {
     using Box = typename TypeParam::Box;
-    for (const PointSet& set : point_sets(20 * thorough, seed + 6)) {
+    for (const PointSet& set : point_sets(20 * thorough, range_query_seed + 6)) {
         const auto points = points_as<TypeParam>(set.points);
-        const auto corners = points_as<TypeParam>(queries_for(set.points, 80, seed + 7));
+        const auto corners =
+            points_as<TypeParam>(queries_for(set.points, 80, range_query_seed + 7));
         std::vector<Box> boxes;
         for (std::size_t i = 0; i + 1 < corners.size(); ++i) {
             Box box{corners[i], corners[i + 1]};  // many are inverted on some axis
@@ -179,11 +184,12 @@ TYPED_TEST(Within, BoxLikeEveryPoint) {
 
 TYPED_TEST(Within, NeighbourListsAreHalfOrFull) {
     using T = typename TypeParam::Scalar;
-    for (const PointSet& set : point_sets(6 * thorough, seed + 8)) {
+    for (const PointSet& set : point_sets(6 * thorough, range_query_seed + 8)) {
         const auto points = points_as<TypeParam>(set.points);
         const EveryPoint<TypeParam> every(points);
         const TypeParam index = build_points(points);
-        const auto queries = points_as<TypeParam>(queries_for(set.points, 20, seed + 9));
+        const auto queries =
+            points_as<TypeParam>(queries_for(set.points, 20, range_query_seed + 9));
         for (const T radius : radii_for<TypeParam>(every, queries)) {
             const auto full = neighbour_lists(index, radius, PairRows::full, {.threads = 2});
             const auto half = neighbour_lists(index, radius, PairRows::half, {.sort = true});
@@ -206,9 +212,10 @@ TYPED_TEST(Within, NeighbourListsAreHalfOrFull) {
 
 TYPED_TEST(Within, ThreadsChangeNothing) {
     using T = typename TypeParam::Scalar;
-    for (const PointSet& set : point_sets(20 * thorough, seed + 10)) {
+    for (const PointSet& set : point_sets(20 * thorough, range_query_seed + 10)) {
         const auto points = points_as<TypeParam>(set.points);
-        const auto queries = points_as<TypeParam>(queries_for(set.points, 1500, seed + 11));
+        const auto queries =
+            points_as<TypeParam>(queries_for(set.points, 1500, range_query_seed + 11));
         const TypeParam index = build_points(points);
         const T radius = radii_for<TypeParam>(EveryPoint<TypeParam>(points), queries).back() / 2;
         if (!std::isfinite(radius)) continue;
@@ -261,14 +268,14 @@ TYPED_TEST(Within, ResultsLargerThanMemoryAreRefused) {
 /// that beside the result, and where a block finds very many, they are found by two walks instead.
 TYPED_TEST(Within, RowsOfOneWalkAndOfTwo) {
     using T = typename TypeParam::Scalar;
-    std::mt19937_64 random(seed + 10);
+    std::mt19937_64 random(range_query_seed + 10);
     const auto unit = [&] { return static_cast<float>(random() >> 40) * 0x1p-24f; };
     std::vector<Vec3> places(thorough > 1 ? 1000
                                           : fewer(200, 2));  // each room that is tried asks for all
     for (Vec3& p : places) p = {unit(), unit(), unit()};
     const auto points = points_as<TypeParam>(places);
-    const auto queries =
-        points_as<TypeParam>(queries_for(places, thorough > 1 ? 4500 : fewer(1200, 2), seed + 11));
+    const auto queries = points_as<TypeParam>(
+        queries_for(places, thorough > 1 ? 4500 : fewer(1200, 2), range_query_seed + 11));
     const TypeParam index = build_points(points);
     const auto same = [&](const auto& a, const auto& b) {
         return std::ranges::equal(a.offsets.view(), b.offsets.view()) &&
@@ -295,7 +302,7 @@ TYPED_TEST(Within, RowsOfOneWalkAndOfTwo) {
     }
     // More than a block keeps: all of 5,000 points for each of many queries.
     const TypeParam large =
-        build_points(points_as<TypeParam>(queries_for(places, 5000, seed + 12)));
+        build_points(points_as<TypeParam>(queries_for(places, 5000, range_query_seed + 12)));
     const std::vector<typename TypeParam::Point> some(queries.begin(),
                                                       queries.begin() + fewer(700, 2));
     const auto all = radius_search(large, some, std::numeric_limits<T>::infinity());
@@ -312,12 +319,13 @@ TYPED_TEST(Within, RowsOfOneWalkAndOfTwo) {
 /// trees that are deep enough.
 TYPED_TEST(Within, RowsInBoxesOfOneWalkAndOfTwo) {
     using Box = typename TypeParam::Box;
-    std::mt19937_64 random(seed + 13);
+    std::mt19937_64 random(range_query_seed + 13);
     const auto unit = [&] { return static_cast<float>(random() >> 40) * 0x1p-24f; };
     std::vector<Vec3> places(fewer(30'000, 3));
     for (Vec3& p : places) p = {unit(), unit(), unit()};
     const auto points = points_as<TypeParam>(places);
-    const auto corners = points_as<TypeParam>(queries_for(places, fewer(200, 4), seed + 14));
+    const auto corners =
+        points_as<TypeParam>(queries_for(places, fewer(200, 4), range_query_seed + 14));
     std::vector<Box> boxes;
     for (std::size_t i = 0; i + 1 < corners.size(); ++i) {
         Box box{corners[i], corners[i + 1]};

@@ -14,10 +14,10 @@
 namespace raydix {
 namespace {
 
-constexpr std::uint64_t seed = 20030112;
+constexpr std::uint64_t exact_overlap_seed = 20030112;
 
 struct Lattice {
-    std::mt19937_64 random{seed};
+    std::mt19937_64 random{exact_overlap_seed};
     unsigned side = 2;
     float coordinate() { return static_cast<float>(random() % (side + 1)); }
     Vec3 point() { return {coordinate(), coordinate(), coordinate()}; }
@@ -49,7 +49,8 @@ TEST(ExactOverlap, TrianglesTouchAsInWholeNumbers) {
         const LeafTriangle s = lattice.triangle(), t = lattice.triangle();
         const bool expected = test::whole_triangles_touch(s, t);
         touching += expected;
-        ASSERT_EQ(triangles_touch(s, t), expected) << "seed " << seed << " case " << i;
+        ASSERT_EQ(triangles_touch(s, t), expected)
+            << "seed " << exact_overlap_seed << " case " << i;
         ASSERT_EQ(triangles_touch(t, s), expected);
         ASSERT_EQ(triangles_touch(LeafTriangle{s.v1, s.v2, s.v0}, LeafTriangle{t.v0, t.v2, t.v1}),
                   expected);
@@ -58,7 +59,7 @@ TEST(ExactOverlap, TrianglesTouchAsInWholeNumbers) {
         ASSERT_EQ(triangles_touch(moved(s, by, 0x1p-9f), moved(t, by, 0x1p-9f)), expected);
         ASSERT_EQ(triangles_touch(moved(s, {}, 0x1p35f), moved(t, {}, 0x1p35f)), expected);
     }
-    std::cout << cases << " pairs, " << touching << " touch, seed " << seed << '\n';
+    std::cout << cases << " pairs, " << touching << " touch, seed " << exact_overlap_seed << '\n';
     EXPECT_GT(touching, cases / 10);
     EXPECT_LT(touching, cases * 9 / 10);
 }
@@ -75,12 +76,13 @@ TEST(ExactOverlap, SegmentsAndPointsTouchAsInWholeNumbers) {
         const bool p_on = test::whole_triangles_touch({p, p, p}, t);
         touching += expected;
         on += p_on;
-        ASSERT_EQ(segment_touches_triangle(p, q, t), expected) << "seed " << seed << " case " << i;
+        ASSERT_EQ(segment_touches_triangle(p, q, t), expected)
+            << "seed " << exact_overlap_seed << " case " << i;
         ASSERT_EQ(segment_touches_triangle(q, p, LeafTriangle{t.v2, t.v1, t.v0}), expected);
         ASSERT_EQ(point_on_triangle(p, t), p_on);
     }
     std::cout << cases << " segments, " << touching << " touch; " << on << " points on, seed "
-              << seed << '\n';
+              << exact_overlap_seed << '\n';
     EXPECT_GT(touching, cases / 20);
     EXPECT_GT(on, cases / 200);
 }

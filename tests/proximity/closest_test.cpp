@@ -5,13 +5,14 @@
 #include <raydix/error.h>
 #include <raydix/model.h>
 
-#include <bit>
 #include <cmath>
 #include <iostream>
 #include <limits>
 
 #include "primitives/zero_area.h"
 #include "proximity/closest_on_triangle.h"
+#include "support/bits.h"
+#include "support/mesh_triangles.h"
 #include "support/message.h"
 #include "support/random.h"
 #include "support/region_distance.h"
@@ -22,21 +23,15 @@
 namespace raydix {
 namespace {
 
-constexpr std::uint64_t seed = 20051019;
-constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+constexpr std::uint64_t closest_seed = 20051019;
+constexpr float closest_nan = std::numeric_limits<float>::quiet_NaN();
 
-bool same_bits(float a, float b) {
-    return std::bit_cast<std::uint32_t>(a) == std::bit_cast<std::uint32_t>(b);
-}
+using test::corners, test::same_float, test::Random;
+
 bool same(const ClosestPoint& a, const ClosestPoint& b) {
-    return a.prim == b.prim && same_bits(a.distance, b.distance) && same_bits(a.u, b.u) &&
-           same_bits(a.v, b.v) && same_bits(a.position.x, b.position.x) &&
-           same_bits(a.position.y, b.position.y) && same_bits(a.position.z, b.position.z);
-}
-
-LeafTriangle corners(const Mesh& mesh, std::size_t i) {
-    const Triangle& t = mesh.triangles[i];
-    return {mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]};
+    return a.prim == b.prim && same_float(a.distance, b.distance) && same_float(a.u, b.u) &&
+           same_float(a.v, b.v) && same_float(a.position.x, b.position.x) &&
+           same_float(a.position.y, b.position.y) && same_float(a.position.z, b.position.z);
 }
 
 ClosestPoint look_at_all(const Mesh& mesh, Vec3 q, float max_distance = infinity) {
@@ -52,8 +47,6 @@ ClosestPoint look_at_all(const Mesh& mesh, Vec3 q, float max_distance = infinity
     }
     return best;
 }
-
-using test::Random;
 
 /// Around the mesh, near its surface, at its corners and far away.
 std::vector<Vec3> queries_around(const Mesh& mesh, std::size_t count, std::uint64_t start) {
@@ -111,34 +104,37 @@ void expect_same(const std::string& name, const Mesh& mesh, const std::vector<Ve
             std::size_t wrong = 0;
             for (std::size_t i = 0; i < queries.size(); ++i) wrong += !same(found[i], expected[i]);
             EXPECT_EQ(wrong, 0u) << name << ", " << builder << ", " << threads << " threads, seed "
-                                 << seed;
+                                 << closest_seed;
         }
     }
 }
 
 TEST(Closest, IsBruteForceBitForBit) {
     for (const Model& scene : test::builtin_triangle_scenes(test::fewer(1000, 4)))
-        expect_same(scene.name, scene.mesh(),
-                    queries_around(scene.mesh(), test::fewer(150 * test::thorough, 3), seed));
-    expect_same(
-        "soup", test::random_soup(1000, seed),
-        queries_around(test::random_soup(1000, seed), test::fewer(150 * test::thorough, 3), seed));
-    const Mesh odd = slivers_and_giants(seed);
+        expect_same(
+            scene.name, scene.mesh(),
+            queries_around(scene.mesh(), test::fewer(150 * test::thorough, 3), closest_seed));
+    expect_same("soup", test::random_soup(1000, closest_seed),
+                queries_around(test::random_soup(1000, closest_seed),
+                               test::fewer(150 * test::thorough, 3), closest_seed));
+    const Mesh odd = slivers_and_giants(closest_seed);
     expect_same("slivers and giants", odd,
-                queries_around(odd, test::fewer(100 * test::thorough, 2), seed));
-    const Mesh lattice = test::lattice_mesh(500, 4, seed);
+                queries_around(odd, test::fewer(100 * test::thorough, 2), closest_seed));
+    const Mesh lattice = test::lattice_mesh(500, 4, closest_seed);
     expect_same("lattice", lattice,
-                queries_around(lattice, test::fewer(100 * test::thorough, 2), seed));
-    const Mesh far = test::moved(test::random_soup(500, seed), {1e5f, 1e5f, -1e5f});
-    expect_same("far away", far, queries_around(far, test::fewer(100 * test::thorough, 2), seed));
+                queries_around(lattice, test::fewer(100 * test::thorough, 2), closest_seed));
+    const Mesh far = test::moved(test::random_soup(500, closest_seed), {1e5f, 1e5f, -1e5f});
+    expect_same("far away", far,
+                queries_around(far, test::fewer(100 * test::thorough, 2), closest_seed));
 }
 
 TEST(Closest, DistancesAreRightToTheRoundingOfCoordinates) {
     std::size_t compared = 0;
-    for (const Mesh& mesh : {test::random_soup(50, seed), slivers_and_giants(seed + 1),
-                             test::lattice_mesh(50, 3, seed),
-                             test::moved(test::random_soup(50, seed), {1e5f, 0, 1e5f})}) {
-        for (const Vec3 q : queries_around(mesh, 200 * test::thorough, seed)) {
+    for (const Mesh& mesh :
+         {test::random_soup(50, closest_seed), slivers_and_giants(closest_seed + 1),
+          test::lattice_mesh(50, 3, closest_seed),
+          test::moved(test::random_soup(50, closest_seed), {1e5f, 0, 1e5f})}) {
+        for (const Vec3 q : queries_around(mesh, 200 * test::thorough, closest_seed)) {
             const std::size_t i = (compared * 2654435761u) % mesh.triangles.size();
             const LeafTriangle t = corners(mesh, i);
             const TrianglePoint p = closest_on_triangle(t, q);
@@ -164,14 +160,14 @@ TEST(Closest, DistancesAreRightToTheRoundingOfCoordinates) {
 }
 
 TEST(Closest, PositionsRepeatTheDistance) {
-    const Mesh mesh = test::random_soup(500, seed);
+    const Mesh mesh = test::random_soup(500, closest_seed);
     const Bvh bvh = build_bvh(mesh);
-    const std::vector<Vec3> queries = queries_around(mesh, 2000, seed);
+    const std::vector<Vec3> queries = queries_around(mesh, 2000, closest_seed);
     const auto found = closest_points(bvh, queries);
     for (std::size_t i = 0; i < queries.size(); ++i) {
         ASSERT_TRUE(found[i].found());
         const Vec3 d = found[i].position - queries[i];
-        EXPECT_TRUE(same_bits(found[i].distance, std::sqrt((d.x * d.x + d.y * d.y) + d.z * d.z)));
+        EXPECT_TRUE(same_float(found[i].distance, std::sqrt((d.x * d.x + d.y * d.y) + d.z * d.z)));
         EXPECT_TRUE(same(closest_point(bvh, queries[i]), found[i]));
     }
 }
@@ -190,7 +186,7 @@ TEST(Closest, TiesGoToTheLowerId) {
     const Mesh two{
         "", {{0, 0, 0}, {1, 0.3f, 0}, {0.2f, 1, -1}, {0.7f, -1, -1}}, {{1, 0, 3}, {0, 1, 2}}};
     const Bvh bvh = build_bvh(two);
-    Random random(seed);
+    Random random(closest_seed);
     int on_the_edge = 0;
     for (int i = 0; i < 1000; ++i) {
         const float s = random.unit();
@@ -215,22 +211,22 @@ TEST(Closest, MaxDistanceIsClosed) {
     EXPECT_EQ(counts.queries, 2u);
     EXPECT_EQ(counts.found, 1u);
     EXPECT_EQ(results[0].distance, infinity);
-    for (const float bad : {-1.0f, nan})
+    for (const float bad : {-1.0f, closest_nan})
         EXPECT_THROW(static_cast<void>(closest_point(bvh, queries[0], bad)), InputError);
 
-    const Mesh soup = test::random_soup(400, seed);
+    const Mesh soup = test::random_soup(400, closest_seed);
     const Bvh tree = build_bvh(soup);
-    for (const Vec3 q : queries_around(soup, 400, seed))
+    for (const Vec3 q : queries_around(soup, 400, closest_seed))
         EXPECT_TRUE(same(closest_point(tree, q, 0.05f), look_at_all(soup, q, 0.05f)));
 }
 
 TEST(Closest, OddInput) {
     const Bvh none;
     EXPECT_FALSE(closest_point(none, {0, 0, 0}).found());
-    Mesh mesh{"", {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {nan, 0, 0}}, {{0, 1, 3}, {0, 1, 2}}};
+    Mesh mesh{"", {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {closest_nan, 0, 0}}, {{0, 1, 3}, {0, 1, 2}}};
     const Bvh bvh = build_bvh(mesh);
     const std::vector<Vec3> queries{
-        {nan, 0, 0}, {0, infinity, 0}, {0, 0, -infinity}, {0, 0, 1}, {0, 0, 1e30f}};
+        {closest_nan, 0, 0}, {0, infinity, 0}, {0, 0, -infinity}, {0, 0, 1}, {0, 0, 1e30f}};
     std::vector<ClosestPoint> results(queries.size());
     const QueryCounts counts = closest_points(bvh, queries, results);
     EXPECT_EQ(counts.invalid_queries, 3u);

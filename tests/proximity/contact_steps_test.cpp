@@ -18,7 +18,7 @@
 namespace raydix::test {
 namespace {
 
-constexpr std::uint64_t seed = 20260301;
+constexpr std::uint64_t contact_steps_seed = 20260301;
 
 Vec3 narrow(Vec3d p) {
     return {static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)};
@@ -99,13 +99,13 @@ struct Needle {
 };
 
 TEST(ContactSteps, NeedlesAreMetAtTheRadius) {
-    RandomD random(seed);
+    RandomD random(contact_steps_seed);
     Tally in_double, in_float;
     for (std::size_t i = 0; i < 150 * thorough; ++i) {
         const Needle needle(random, i);
         check_double(needle.triangle, needle.sweep, in_double);
         check_float(needle.triangle, needle.sweep, in_float);
-        ASSERT_FALSE(HasFatalFailure()) << "case " << i << ", seed " << seed;
+        ASSERT_FALSE(HasFatalFailure()) << "case " << i << ", seed " << contact_steps_seed;
     }
     std::cout << in_double.contacts << " contacts, " << in_double.misses
               << " misses; off by up to 2^" << std::log2(in_double.worst) << " and, in float, 2^"

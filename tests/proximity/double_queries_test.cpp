@@ -13,6 +13,7 @@
 #include "proximity/winding_tree.h"
 #include "support/double_scenes.h"
 #include "support/exact.h"
+#include "support/mesh_triangles.h"
 #include "support/random.h"
 #include "support/sanitized.h"
 #include "support/support.h"
@@ -20,15 +21,10 @@
 namespace raydix::test {
 namespace {
 
-constexpr std::uint64_t seed = 20051213;
+constexpr std::uint64_t double_queries_seed = 20051213;
 constexpr Builder all_builders[] = {
     Builder::karras, Builder::lauterbach, Builder::garanzha, Builder::apetrei, Builder::ploc,
     Builder::hploc,  Builder::binned,     Builder::sweep,    Builder::split,   Builder::sbvh};
-
-LeafTriangleD corners(const MeshD& mesh, std::size_t i) {
-    const Triangle& t = mesh.triangles[i];
-    return {mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]};
-}
 
 bool same(const ClosestPointD& a, const ClosestPointD& b) {
     return a.prim == b.prim && a.position == b.position && a.distance == b.distance && a.u == b.u &&
@@ -49,7 +45,7 @@ ClosestPointD closest_of_all(const MeshD& mesh, Vec3d q) {
 
 /// Around the box of the mesh, on its corners and edges, and far away.
 std::vector<Vec3d> queries_for(const MeshD& mesh, std::size_t count) {
-    RandomD random(seed);
+    RandomD random(double_queries_seed);
     AabbD box = box_of_mesh(mesh);
     const Vec3d margin = 0.2 * (box.hi - box.lo);
     box = {box.lo - margin, box.hi + margin};
@@ -110,7 +106,7 @@ Exact square_to_triangle(const LeafTriangleD& t, Vec3d query) {
 }
 
 TEST(DoubleQueries, ClosestPointsOfSliversAreRight) {
-    RandomD random(seed);
+    RandomD random(double_queries_seed);
     double worst = 0;
     for (int i = 0; i < static_cast<int>(60 * thorough); ++i) {
         const Vec3d a = utm_place + 100.0 * random.direction();
@@ -147,7 +143,7 @@ Pair figure_pair() {
 }
 
 std::vector<Vec3> exact_queries(const Mesh& mesh, std::size_t count) {
-    Random random(seed);
+    Random random(double_queries_seed);
     const Aabb box = inspect(mesh).bounds;
     std::vector<Vec3> queries(count);
     for (std::size_t i = 0; i < count; ++i) {
@@ -289,7 +285,7 @@ TEST(DoubleQueries, SegmentsAndSpheresLikeEveryTriangle) {
          {random_soup_d(400, 5, 0.2), in_double(random_soup(400, 6, 0.2f), 100.0, utm_place),
           in_double(random_soup(400, 7, 0.2f), 1.2e12, {-0.6e12, -0.6e12, -0.6e12}),
           slivers_d(400, 14), with_stray(slivers_d(400, 14), {}), slivers_d(400, 15, {})}) {
-        RandomD random(seed);
+        RandomD random(double_queries_seed);
         const AabbD box = box_of_mesh(mesh);
         const double size = box.hi.x - box.lo.x;
         std::vector<SegmentD> segments;

@@ -12,25 +12,21 @@
 #include "proximity/sweep_walk.h"
 #include "support/double_scenes.h"
 #include "support/exact_distance.h"
+#include "support/mesh_triangles.h"
 #include "support/scenes.h"
 #include "support/support.h"
 
 namespace raydix::test {
 namespace {
 
-constexpr std::uint64_t seed = 20130219;
+constexpr std::uint64_t double_sweep_seed = 20130219;
 constexpr double inf = std::numeric_limits<double>::infinity();
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr Builder all_builders[] = {
+constexpr Builder sweep_builders[] = {
     Builder::karras, Builder::lauterbach, Builder::garanzha, Builder::apetrei, Builder::ploc,
     Builder::hploc,  Builder::binned,     Builder::sweep,    Builder::split,   Builder::sbvh};
 
-LeafTriangleD corners(const MeshD& mesh, std::size_t i) {
-    const Triangle& t = mesh.triangles[i];
-    return {mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]};
-}
-
-bool same(const SweepHitD& a, const SweepHitD& b) {
+bool same_sweep(const SweepHitD& a, const SweepHitD& b) {
     return a.t == b.t && a.prim == b.prim && a.position == b.position && a.u == b.u && a.v == b.v;
 }
 
@@ -51,11 +47,11 @@ SweepHitD first_of_all(const MeshD& mesh, const BvhD& bvh, const SphereSweepD& s
 
 /// The rays of every kind that rays are tried with, with balls from tiny to a fifth of the scene.
 std::vector<SphereSweepD> sweeps_for(const MeshD& mesh, std::size_t count) {
-    RandomD random(seed);
+    RandomD random(double_sweep_seed);
     const AabbD box = box_of_mesh(mesh);
     const double size = max_of(box.hi.x - box.lo.x, box.hi.y - box.lo.y);
     std::vector<SphereSweepD> sweeps;
-    for (const RayD& ray : mixed_rays(mesh, count, seed)) {
+    for (const RayD& ray : mixed_rays(mesh, count, double_sweep_seed)) {
         const double part = std::ldexp(0.2, -static_cast<int>(random.below(25)));
         sweeps.push_back({ray, part * size * (0.5 + 0.5 * random.unit())});
     }
@@ -69,7 +65,7 @@ TEST(DoubleSweeps, LikeEveryTriangle) {
           in_double(random_soup(300, 3), 1.4e12, {-0.7e12, -0.7e12, -0.7e12}),
           in_double(random_soup(300, 4), 1e-9), slivers_d(300, 5),
           with_stray(slivers_d(300, 5), {}), slivers_d(300, 6, {}),
-          in_double(lattice_mesh(300, 5, seed))}) {
+          in_double(lattice_mesh(300, 5, double_sweep_seed))}) {
         const std::vector<SphereSweepD> sweeps = sweeps_for(mesh, 80 * thorough);
         const BvhD any_tree = build_bvh(mesh);
         std::vector<SweepHitD> wanted;
@@ -84,12 +80,12 @@ TEST(DoubleSweeps, LikeEveryTriangle) {
                                         wanted, [](const SweepHitD& h) { return h.hit(); })));
             return hits_of_batch;
         };
-        for (const Builder builder : all_builders)
+        for (const Builder builder : sweep_builders)
             for (const int threads : {1, 3})
                 EXPECT_TRUE(std::ranges::equal(
-                    found_in(build_bvh(mesh, {.builder = builder}), threads), wanted, same))
+                    found_in(build_bvh(mesh, {.builder = builder}), threads), wanted, same_sweep))
                     << builder_name(builder) << " of a mesh around " << any_tree.center().x;
-        EXPECT_TRUE(same(sweep_sphere(any_tree, sweeps[3]), wanted[3]));
+        EXPECT_TRUE(same_sweep(sweep_sphere(any_tree, sweeps[3]), wanted[3]));
         for (const SweepHitD& hit : wanted) hits += hit.hit();
         all += wanted.size();
     }
@@ -174,14 +170,14 @@ struct FarCase {
     }
 };
 
-struct Tally {
+struct SweepTally {
     double worst_distance = 0, worst_place = 0;
     std::size_t contacts = 0, inside = 0, misses = 0, grazing = 0;
 };
 
 /// `wanted`: the time of the search; `clearance`: how far the ball is from grazing.
 void check_contact(const FarCase& far, const SweepHitD& hit, Real wanted, Real clearance,
-                   Tally& tally) {
+                   SweepTally& tally) {
     const LeafTriangleD t = corners(far.mesh, 0);
     const SphereSweepD& sweep = far.sweep;
     ++tally.contacts;
@@ -211,8 +207,8 @@ void check_contact(const FarCase& far, const SweepHitD& hit, Real wanted, Real c
 /// Where a step of float is half a metre and one of double a nanometre. Balls that graze are told
 /// apart, no other case is.
 TEST(DoubleSweeps, AreRightFarFromTheOrigin) {
-    RandomD random(seed);
-    Tally tally;
+    RandomD random(double_sweep_seed);
+    SweepTally tally;
     for (std::size_t i = 0; i < 100 * thorough; ++i) {
         const FarCase far(random, i);
         if (has_zero_area(corners(far.mesh, 0))) continue;
@@ -271,7 +267,7 @@ TEST(DoubleSweeps, WithoutARadiusAreRays) {
     const MeshD mesh = in_double(random_soup(500, 6), 100.0, utm_place);
     const BvhD bvh = build_bvh(mesh);
     std::size_t hits = 0;
-    for (const RayD& ray : mixed_rays(mesh, 100 * thorough, seed)) {
+    for (const RayD& ray : mixed_rays(mesh, 100 * thorough, double_sweep_seed)) {
         const HitD wanted = closest_hit(bvh, ray);
         const SweepHitD hit = sweep_sphere(bvh, {ray, 0.0});
         ASSERT_EQ(hit.t, wanted.t);

@@ -6,13 +6,14 @@
 #include <raydix/overlap.h>
 #include <raydix/trace.h>
 
-#include <bit>
 #include <iostream>
 #include <limits>
 
 #include "proximity/sweep_walk.h"
 #include "proximity/touch_walk.h"
+#include "support/bits.h"
 #include "support/exact_overlap_reference.h"
+#include "support/mesh_triangles.h"
 #include "support/random.h"
 #include "support/region_distance.h"
 #include "support/scenes.h"
@@ -21,16 +22,11 @@
 namespace raydix {
 namespace {
 
-constexpr std::uint64_t seed = 19880711;
-constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+constexpr std::uint64_t overlap_seed = 19880711;
+constexpr float overlap_nan = std::numeric_limits<float>::quiet_NaN();
 constexpr const char* some_builders[] = {"karras", "apetrei", "hploc", "binned", "split", "sbvh"};
 
-using test::Random;
-
-LeafTriangle corners(const Mesh& mesh, std::size_t i) {
-    const Triangle& t = mesh.triangles[i];
-    return {mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]};
-}
+using test::corners, test::same_float, test::Random;
 
 bool touch(const Segment& s, const LeafTriangle& t) {
     return segment_touches_triangle(s.a, s.b, t);
@@ -66,7 +62,7 @@ void expect_brute_force(const std::string& name, const Mesh& mesh,
 }
 
 std::vector<Segment> segments(std::size_t count, float lo, float hi, bool lattice) {
-    Random random(seed);
+    Random random(overlap_seed);
     std::vector<Segment> list;
     const auto place = [&] {
         const Vec3 p = random.in(lo, hi);
@@ -81,16 +77,17 @@ std::vector<Segment> segments(std::size_t count, float lo, float hi, bool lattic
 
 TEST(Overlap, SegmentsAreBruteForce) {
     const std::size_t n = 50 * test::thorough;
-    expect_brute_force("segments, soup", test::random_soup(1000, seed, 0.2f),
+    expect_brute_force("segments, soup", test::random_soup(1000, overlap_seed, 0.2f),
                        segments(n, -0.2f, 1.2f, false));
-    expect_brute_force("segments, lattice", test::lattice_mesh(300, 5, seed),
+    expect_brute_force("segments, lattice", test::lattice_mesh(300, 5, overlap_seed),
                        segments(n, -1, 7, true));
-    expect_brute_force("segments, huge", test::scaled(test::lattice_mesh(300, 5, seed), 1e9f),
+    expect_brute_force("segments, huge",
+                       test::scaled(test::lattice_mesh(300, 5, overlap_seed), 1e9f),
                        segments(n, -1e9f, 7e9f, false));
 }
 
 TEST(Overlap, SegmentsOnALatticeTouchAsInWholeNumbers) {
-    const Mesh mesh = test::lattice_mesh(200, 5, seed);
+    const Mesh mesh = test::lattice_mesh(200, 5, overlap_seed);
     const Bvh bvh = build_bvh(mesh);
     for (const Segment& s : segments(100 * test::thorough, -1, 7, true)) {
         bool expected = false;
@@ -101,15 +98,15 @@ TEST(Overlap, SegmentsOnALatticeTouchAsInWholeNumbers) {
 }
 
 TEST(Overlap, SpheresAreBruteForce) {
-    Random random(seed);
+    Random random(overlap_seed);
     std::vector<Sphere> spheres;
-    const Mesh soup = test::random_soup(1000, seed);
+    const Mesh soup = test::random_soup(1000, overlap_seed);
     for (std::size_t i = 0; i < 100 * test::thorough; ++i)
         spheres.push_back({random.in(-0.2f, 1.2f), i % 4 == 0 ? 0.0f : random.between(0, 0.2f)});
     for (std::size_t i = 0; i < 100; ++i) spheres.push_back({soup.vertices[i], 0.0f});
-    spheres.push_back({{0, nan, 0}, 1});
+    spheres.push_back({{0, overlap_nan, 0}, 1});
     spheres.push_back({{0, 0, 0}, -1});
-    spheres.push_back({{0, 0, 0}, nan});
+    spheres.push_back({{0, 0, 0}, overlap_nan});
     spheres.push_back({{0, 0, 0}, infinity});
     expect_brute_force("spheres, soup", soup, spheres);
     const Mesh ball = test::ball_mesh({0, 0, 0});
@@ -120,7 +117,7 @@ TEST(Overlap, SpheresAreBruteForce) {
 }
 
 std::vector<SphereSweep> sweeps(std::size_t count, float lo, float hi, float radius) {
-    Random random(seed);
+    Random random(overlap_seed);
     std::vector<SphereSweep> list;
     for (std::size_t i = 0; i < count; ++i) {
         Ray ray{random.in(lo, hi), 0, random.in(-1, 1)};
@@ -132,10 +129,6 @@ std::vector<SphereSweep> sweeps(std::size_t count, float lo, float hi, float rad
         list.push_back({ray, random.between(0, radius)});
     }
     return list;
-}
-
-bool same_bits(float a, float b) {
-    return std::bit_cast<std::uint32_t>(a) == std::bit_cast<std::uint32_t>(b);
 }
 
 void expect_sweeps(const std::string& name, const Mesh& mesh,
@@ -159,21 +152,22 @@ void expect_sweeps(const std::string& name, const Mesh& mesh,
             const std::vector<SweepHit> found = sweep_spheres(bvh, list, {.threads = threads});
             std::size_t wrong = 0;
             for (std::size_t k = 0; k < list.size(); ++k)
-                wrong += !same_bits(found[k].t, expected[k].t) || found[k].prim != expected[k].prim;
+                wrong +=
+                    !same_float(found[k].t, expected[k].t) || found[k].prim != expected[k].prim;
             EXPECT_EQ(wrong, 0u) << name << ' ' << builder << ' ' << threads;
         }
 }
 
 TEST(Overlap, SweepsAreBruteForce) {
     const std::size_t n = 50 * test::thorough;
-    expect_sweeps("soup", test::random_soup(1000, seed), sweeps(n, -1, 2, 0.1f));
+    expect_sweeps("soup", test::random_soup(1000, overlap_seed), sweeps(n, -1, 2, 0.1f));
     expect_sweeps("ball", test::ball_mesh({0, 0, 0}), sweeps(n, -200, 200, 20));
-    expect_sweeps("lattice", test::lattice_mesh(300, 5, seed), sweeps(n, -3, 8, 0.3f));
+    expect_sweeps("lattice", test::lattice_mesh(300, 5, overlap_seed), sweeps(n, -3, 8, 0.3f));
 }
 
 /// The contact is at the radius, and nothing on the way to it is nearer.
 TEST(Overlap, SweepsStopWhereTheDistanceIsTheRadius) {
-    const Mesh mesh = test::random_soup(60, seed, 0.3f);
+    const Mesh mesh = test::random_soup(60, overlap_seed, 0.3f);
     const Bvh bvh = build_bvh(mesh);
     const auto distance = [&](const Ray& ray, double t) {
         const Vec3 p{float(ray.origin.x + t * ray.direction.x),
@@ -209,14 +203,14 @@ TEST(Overlap, SweepsStopWhereTheDistanceIsTheRadius) {
 }
 
 TEST(Overlap, SweepsWithoutARadiusAreRays) {
-    const Mesh mesh = test::random_soup(1000, seed);
+    const Mesh mesh = test::random_soup(1000, overlap_seed);
     const Bvh bvh = build_bvh(mesh);
     std::vector<SphereSweep> list = sweeps(500, -1, 2, 0.1f);
     for (SphereSweep& sweep : list) sweep.radius = 0;
     for (const SphereSweep& sweep : list) {
         const Hit ray = closest_hit(bvh, sweep.path);
         const SweepHit hit = sweep_sphere(bvh, sweep);
-        EXPECT_TRUE(same_bits(hit.t, ray.t));
+        EXPECT_TRUE(same_float(hit.t, ray.t));
         EXPECT_EQ(hit.prim, ray.prim);
     }
 }
@@ -253,7 +247,7 @@ TEST(Overlap, SweepsFromAfarFindParts) {
             const Bvh bvh = build_bvh(mesh, {.builder = builder, .max_leaf = max_leaf});
             const SweepHit hit = sweep_sphere(bvh, sweep);
             EXPECT_EQ(hit.prim, whole.prim) << builder_name(builder) << ' ' << max_leaf;
-            EXPECT_TRUE(same_bits(hit.t, whole.t));
+            EXPECT_TRUE(same_float(hit.t, whole.t));
         }
     EXPECT_TRUE(build_bvh(mesh, {.builder = Builder::sbvh, .max_leaf = 1}).has_split_primitives());
 }
@@ -283,7 +277,7 @@ TEST(Overlap, OddInput) {
     const Bvh bvh = build_bvh(mesh), none;
     EXPECT_TRUE(touches(bvh, Segment{{0, 0, 0}, {0, 0, 0}}));
     EXPECT_FALSE(touches(none, Segment{{0, 0, 0}, {0, 0, 0}}));
-    EXPECT_FALSE(touches(bvh, Segment{{nan, 0, 0}, {0, 0, 0}}));
+    EXPECT_FALSE(touches(bvh, Segment{{overlap_nan, 0, 0}, {0, 0, 0}}));
     EXPECT_FALSE(touches(none, Sphere{{0, 0, 0}, 1}));
     EXPECT_TRUE(touches(bvh, Sphere{{0, 0, 1}, 1}));
     EXPECT_FALSE(touches(bvh, Sphere{{0, 0, 1}, 0.999f}));
@@ -294,9 +288,9 @@ TEST(Overlap, OddInput) {
         << "from the start";
     EXPECT_FALSE(sweep_sphere(bvh, {{{0.2f, 0.2f, 3}, 0, {0, 0, 1}}, 1}).hit());
     const std::vector<SphereSweep> bad{{{{0, 0, 0}, 0, {0, 0, 0}}, 1},
-                                       {{{nan, 0, 0}, 0, {0, 0, 1}}, 1},
+                                       {{{overlap_nan, 0, 0}, 0, {0, 0, 1}}, 1},
                                        {{{0, 0, 0}, 0, {0, 0, 1}}, -1},
-                                       {{{0, 0, 0}, 0, {0, 0, 1}}, nan},
+                                       {{{0, 0, 0}, 0, {0, 0, 1}}, overlap_nan},
                                        {{{0, 0, 0}, 2, {0, 0, 1}, 1}, 1}};
     std::vector<SweepHit> hits(bad.size());
     EXPECT_EQ(sweep_spheres(bvh, bad, hits).invalid_queries, bad.size());

@@ -9,6 +9,7 @@
 
 #include "primitives/exact_overlap.h"
 #include "support/exact_overlap_reference.h"
+#include "support/mesh_triangles.h"
 #include "support/sanitized.h"
 #include "support/scenes.h"
 #include "support/support.h"
@@ -16,16 +17,13 @@
 namespace raydix {
 namespace {
 
-constexpr std::uint64_t seed = 20000517;
-constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+using test::corners;
+constexpr std::uint64_t pairs_seed = 20000517;
+constexpr float pairs_nan = std::numeric_limits<float>::quiet_NaN();
 constexpr const char* all_builders[] = {"karras", "lauterbach", "garanzha", "apetrei", "ploc",
                                         "hploc",  "binned",     "sweep",    "split",   "sbvh"};
 using Pairs = std::vector<PrimitivePair>;
 
-LeafTriangle corners(const Mesh& mesh, std::size_t i) {
-    const Triangle& t = mesh.triangles[i];
-    return {mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]};
-}
 Aabb box_of(const LeafTriangle& t) { return raydix::box_of(t.v0, t.v1, t.v2); }
 
 bool shares(const LeafTriangle& a, const LeafTriangle& b) {
@@ -84,17 +82,17 @@ void expect_all(const std::string& name, const Mesh& x, const Mesh& y, const Tou
 
 TEST(Pairs, AreBruteForce) {
     const std::size_t n = test::sanitized ? 120 : 200 + 60 * test::thorough;
-    expect_all("soups", test::random_soup(n, seed, 0.15f), test::random_soup(n, seed + 1, 0.1f),
-               triangles_touch<LeafTriangle>);
-    expect_all("lattices", test::lattice_mesh(n / 4, 6, seed),
-               test::lattice_mesh(n / 4, 5, seed + 1), test::whole_triangles_touch);
+    expect_all("soups", test::random_soup(n, pairs_seed, 0.15f),
+               test::random_soup(n, pairs_seed + 1, 0.1f), triangles_touch<LeafTriangle>);
+    expect_all("lattices", test::lattice_mesh(n / 4, 6, pairs_seed),
+               test::lattice_mesh(n / 4, 5, pairs_seed + 1), test::whole_triangles_touch);
     const Mesh ball = test::ball_mesh({0, 0, 0}), other = test::ball_mesh({60, 10, -20});
     expect_all("balls", ball, other,
                [&](const LeafTriangle& a, const LeafTriangle& b) { return triangles_touch(b, a); });
 }
 
 TEST(Pairs, OfBoxesAndPoints) {
-    std::mt19937_64 random(seed);
+    std::mt19937_64 random(pairs_seed);
     const auto unit = [&] { return static_cast<float>(random() % 17) / 16.0f; };
     std::vector<Aabb> boxes;
     std::vector<Vec3> points;
@@ -103,7 +101,7 @@ TEST(Pairs, OfBoxesAndPoints) {
         boxes.push_back({lo, lo + Vec3{0.125f, 0.0625f, 0.25f}});
         points.push_back({unit(), unit(), unit()});
     }
-    boxes[3] = {{0, 0, 0}, {nan, 1, 1}};
+    boxes[3] = {{0, 0, 0}, {pairs_nan, 1, 1}};
     Pairs within, between, equal;
     for (std::uint32_t i = 0; i < boxes.size(); ++i)
         for (std::uint32_t j = 0; j < boxes.size(); ++j) {
@@ -183,7 +181,7 @@ TEST(Pairs, OddInput) {
                                      {{0, 0, 0},
                                       {1, 0, 0},
                                       {0, 1, 0},
-                                      {nan, 0, 0},
+                                      {pairs_nan, 0, 0},
                                       {0.2f, 0.2f, -1},
                                       {0.2f, 0.2f, 1},
                                       {0.3f, 0.2f, 1}},

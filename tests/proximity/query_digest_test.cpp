@@ -22,7 +22,7 @@
 namespace raydix::test {
 namespace {
 
-constexpr std::uint64_t seed = 12;
+constexpr std::uint64_t query_digest_seed = 12;
 constexpr std::size_t query_count = 800;
 
 /// Today's calls in float. Those with the same names for both are called by name.
@@ -59,7 +59,7 @@ struct DoubleCalls {
 
 /// Needles, segments and points among triangles, and a few that are large.
 MeshD with_degenerate() {
-    RandomD random(seed);
+    RandomD random(query_digest_seed);
     const auto point = [&](double by) { return random.in({{-by, -by, -by}, {by, by, by}}); };
     MeshD mesh;
     const auto add = [&](Vec3d a, Vec3d b, Vec3d c) {
@@ -111,7 +111,7 @@ MeshD mesh_named(const std::string& name) {
         for (Vec3d& p : mesh.vertices) p = (1.0 / 3.0) * p + utm_place;
         return mesh;
     }
-    if (name == "lattice") return in_double(lattice_mesh(300, 5, seed));
+    if (name == "lattice") return in_double(lattice_mesh(300, 5, query_digest_seed));
     return with_degenerate();
 }
 
@@ -167,7 +167,7 @@ private:
     }
     /// In and near the box, at corners, near corners, and far away.
     void make_queries() {
-        RandomD random(seed);
+        RandomD random(query_digest_seed);
         const auto beside = [&](double by) {
             return (by * extent()) * random.in({{-1, -1, -1}, {1, 1, 1}});
         };
@@ -185,7 +185,7 @@ private:
             balls.push_back({Calls::point(inside), static_cast<Number>(size)});
             balls.push_back({Calls::point(corner), Number{0}});
         }
-        for (const auto& ray : Calls::rays(digest_rays(wide_, query_count, seed)))
+        for (const auto& ray : Calls::rays(digest_rays(wide_, query_count, query_digest_seed)))
             sweeps.push_back({ray, static_cast<Number>(sweeps.size() % 5 == 0
                                                            ? 0.0
                                                            : random.between(0, 0.02) * extent())});

@@ -21,7 +21,7 @@
 namespace raydix::test {
 namespace {
 
-constexpr std::uint64_t seed = 20190321;
+constexpr std::uint64_t shape_hits_seed = 20190321;
 
 using Digits = boost::multiprecision::cpp_bin_float_100;
 
@@ -94,7 +94,7 @@ bool hit_of(const CapsuleD& c, bool ball, const RayD& ray, HitD& hit) {
 /// What is hit is on the surface; between the start and there, or the end of a ray that misses, the
 /// ray stays on one side of it.
 TEST(ShapeHits, HitsAreOnTheSurface) {
-    RandomD random(seed + 3);
+    RandomD random(shape_hits_seed + 3);
     double worst = 0.0;
     std::size_t hits = 0, inside = 0;
     for (int i = 0; i < static_cast<int>(400 * thorough); ++i) {
@@ -134,7 +134,7 @@ TEST(ShapeHits, HitsAreOnTheSurface) {
 
 /// t of a ball against the quadratic in a hundred digits.
 TEST(ShapeHits, RootsInAHundredDigits) {
-    RandomD random(seed + 4);
+    RandomD random(shape_hits_seed + 4);
     double worst = 0.0;
     std::size_t compared = 0, missed = 0;
     for (int i = 0; i < static_cast<int>(500 * thorough); ++i) {
@@ -179,7 +179,7 @@ TEST(ShapeHits, RootsInAHundredDigits) {
 }
 
 std::vector<Ray> random_rays(std::size_t count) {
-    Random random(seed);
+    Random random(shape_hits_seed);
     std::vector<Ray> rays;
     for (std::size_t i = 0; i < count; ++i) {
         const Vec3 from = i % 2 ? random.in(0, 1) : random.in(-3, 4);
@@ -225,7 +225,7 @@ double segment_distance(Double3 p, const Capsule& c) {
 
 /// A hit is on the surface, and the ray crosses none before it.
 TEST(ShapeHits, FloatsAreOnTheSurface) {
-    Random random(seed);
+    Random random(shape_hits_seed);
     std::size_t hits = 0, from_inside = 0;
     for (const Ray& ray : random_rays(200 * thorough)) {
         const Capsule one{random.in(0, 1), random.in(0, 1), random.between(0.01f, 0.4f)};

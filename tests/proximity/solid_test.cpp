@@ -19,8 +19,8 @@
 namespace raydix {
 namespace {
 
-constexpr std::uint64_t seed = 20050501;
-constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+constexpr std::uint64_t solid_seed = 20050501;
+constexpr float solid_nan = std::numeric_limits<float>::quiet_NaN();
 
 using test::Random;
 
@@ -98,7 +98,7 @@ std::vector<std::uint8_t> inside_of(const Mesh& mesh, const std::vector<Vec3>& q
 
 /// Places beside edges and vertices, from very near to far, whose closest feature is one.
 std::vector<Vec3> points_at_sharp_features(const Mesh& mesh, const Bvh& bvh, std::size_t count) {
-    Random random(seed);
+    Random random(solid_seed);
     std::vector<Vec3> points;
     while (points.size() < count) {
         const Triangle& t = mesh.triangles[random.below(mesh.triangles.size())];
@@ -128,7 +128,7 @@ TEST(Solid, SignsAreRightAtTheSharpEdgesOfASpikyCone) {
             wrong += (distances[i] < 0) != is_inside;
         }
         std::cout << builder << ": " << points.size() << " points beside edges and vertices, "
-                  << inside << " inside, " << wrong << " wrong, seed " << seed << '\n';
+                  << inside << " inside, " << wrong << " wrong, seed " << solid_seed << '\n';
         EXPECT_EQ(wrong, 0u);
         EXPECT_GT(inside, points.size() / 100);
     }
@@ -140,7 +140,7 @@ TEST(Solid, AFigureFarAwayAgreesWithItselfAlongOtherAxes) {
     // Rounding may have closed faces to lines or folded them: the surface is still closed.
     const Bvh bvh = build_bvh(mesh);
     ASSERT_EQ(Solid(bvh).closure(), Closure::oriented);
-    Random random(seed);
+    Random random(solid_seed);
     std::vector<Vec3> points(1000000 * test::thorough / 20), other;
     for (Vec3& p : points) {  // one half on the lattice of floats right at the surface
         p = random.in(bvh.bounds());
@@ -169,7 +169,7 @@ TEST(Solid, AFigureFarAwayAgreesWithItselfAlongOtherAxes) {
     compare_turned(turned);
     std::cout << points.size() << " points, " << inside << " inside, " << differ
               << " differ along y or z; " << judged << " winding numbers, " << wrong
-              << " wrong, seed " << seed << '\n';
+              << " wrong, seed " << solid_seed << '\n';
     EXPECT_EQ(differ, 0u);
     EXPECT_EQ(wrong, 0u);
     EXPECT_GT(inside, points.size() / 20);
@@ -199,14 +199,14 @@ TEST(Solid, LayersAddUpTheirErrorsOfWindingNumbers) {
         const Bvh bvh = build_bvh(mesh);
         const Solid solid(bvh);
         ASSERT_EQ(solid.rule(), InsideRule::winding);
-        Random random(seed);
+        Random random(solid_seed);
         std::vector<Vec3> points(300);
         for (Vec3& p : points) p = random.in({{0, 0, -1}, {1, 1, 2}});
         const std::vector<double> numbers = winding_numbers(solid, points);
         double worst = 0;
         for (std::size_t i = 0; i < points.size(); ++i)
             worst = std::max(worst, std::fabs(numbers[i] - exact_winding(mesh, points[i])));
-        std::cout << count << " layers: error " << worst << ", seed " << seed << '\n';
+        std::cout << count << " layers: error " << worst << ", seed " << solid_seed << '\n';
         EXPECT_LT(worst, 0.01 * count);
     }
 }
@@ -261,7 +261,7 @@ TEST(Solid, NeighboursThatTurnAgainstEachOtherAreCountedByParity) {
     EXPECT_EQ(solid.closure(), Closure::closed);
     EXPECT_EQ(solid.rule(), InsideRule::parity);
     EXPECT_EQ(solid.open_edges(), 0u);
-    Random random(seed);
+    Random random(solid_seed);
     const Mesh good = spiky_cone();
     for (int i = 0; i < 2000; ++i) {
         const Vec3 p = random.in(bvh.bounds());
@@ -271,7 +271,7 @@ TEST(Solid, NeighboursThatTurnAgainstEachOtherAreCountedByParity) {
 
 TEST(Solid, MeshesWithHolesGoByTheGeneralizedWindingNumber) {
     Mesh mesh = load_model("builtin:figure?triangles=20000").mesh();
-    Random random(seed);
+    Random random(solid_seed);
     for (int hole = 0; hole < 40; ++hole)
         mesh.triangles.erase(mesh.triangles.begin() +
                              static_cast<std::ptrdiff_t>(random.below(mesh.triangles.size())));
@@ -299,7 +299,7 @@ TEST(Solid, MeshesWithHolesGoByTheGeneralizedWindingNumber) {
 
 TEST(Solid, SameForEveryBuilderAndThreadCount) {
     const Mesh mesh = spiky_cone();
-    Random random(seed);
+    Random random(solid_seed);
     std::vector<Vec3> points(5000);
     for (Vec3& p : points) p = random.in({{-1.2f, -1.2f, -0.5f}, {1.2f, 1.2f, 3.5f}});
     std::vector<float> first;
@@ -325,7 +325,7 @@ TEST(Solid, OddInput) {
     const Bvh bvh = build_bvh(spiky_cone());
     const Solid solid(bvh);
     const std::vector<Vec3> points{
-        {nan, 0, 0}, {0, infinity, 0}, {0, 0, 1}, {50, 0, 0}, {3e38f, -3e38f, 3e38f}};
+        {solid_nan, 0, 0}, {0, infinity, 0}, {0, 0, 1}, {50, 0, 0}, {3e38f, -3e38f, 3e38f}};
     std::vector<std::uint8_t> inside(points.size());
     const QueryCounts counts = contains(solid, points, inside);
     EXPECT_EQ(counts.invalid_queries, 2u);

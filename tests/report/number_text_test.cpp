@@ -7,8 +7,8 @@
 namespace raydix::report {
 namespace {
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr double infinite = std::numeric_limits<double>::infinity();
+constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
+constexpr double endless = std::numeric_limits<double>::infinity();
 const std::string dash = "\xE2\x80\x93", minus = "\xE2\x88\x92";
 
 TEST(Grouped, PutsCommasAtThousands) {
@@ -23,8 +23,8 @@ TEST(WithDecimals, GroupsTheWholePartOnly) {
     EXPECT_EQ(with_decimals(1234.5678, 3), "1,234.568");
     EXPECT_EQ(with_decimals(-1234567.25, 1), minus + "1,234,567.2");
     EXPECT_EQ(with_decimals(-0.001, 1), "0.0");
-    EXPECT_EQ(with_decimals(nan, 2), dash);
-    EXPECT_EQ(with_decimals(-infinite, 2), dash);
+    EXPECT_EQ(with_decimals(not_a_number, 2), dash);
+    EXPECT_EQ(with_decimals(-endless, 2), dash);
 }
 
 TEST(Significant, KeepsTheDigitsThatCount) {
@@ -37,7 +37,7 @@ TEST(Significant, KeepsTheDigitsThatCount) {
     EXPECT_EQ(significant(1e20), "1.00e+20");
     EXPECT_EQ(significant(0.99999), "1.00");
     EXPECT_EQ(significant(9.996), "10.0");
-    EXPECT_EQ(significant(nan), dash);
+    EXPECT_EQ(significant(not_a_number), dash);
 }
 
 TEST(ShortNumber, IsShortOnAxes) {
@@ -47,13 +47,13 @@ TEST(ShortNumber, IsShortOnAxes) {
     EXPECT_EQ(short_number(0.002), "0.002");
     EXPECT_EQ(short_number(64), "64");
     EXPECT_EQ(short_number(0), "0");
-    EXPECT_EQ(short_number(infinite), dash);
+    EXPECT_EQ(short_number(endless), dash);
 }
 
 TEST(Percent, OfAPart) {
     EXPECT_EQ(percent(0.4231), "42.3 %");
     EXPECT_EQ(percent(6.129), "612.9 %");
-    EXPECT_EQ(percent(nan), dash);
+    EXPECT_EQ(percent(not_a_number), dash);
 }
 
 TEST(DecimalsFor, OneColumnHasOneNumberOfDigits) {
@@ -62,7 +62,7 @@ TEST(DecimalsFor, OneColumnHasOneNumberOfDigits) {
     EXPECT_EQ(decimals_for({24.1, 300}), 1);
     EXPECT_EQ(decimals_for({0.12, 300}), 2);
     EXPECT_EQ(decimals_for({0.00001, 300}), 4);
-    EXPECT_EQ(decimals_for({nan, 5}), 0);
+    EXPECT_EQ(decimals_for({not_a_number, 5}), 0);
 }
 
 }  // namespace

@@ -14,8 +14,8 @@
 namespace raydix::report {
 namespace {
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr double infinite = std::numeric_limits<double>::infinity();
+constexpr double no_value = std::numeric_limits<double>::quiet_NaN();
+constexpr double no_end = std::numeric_limits<double>::infinity();
 
 std::size_t count(const std::string& text, const std::string& part) {
     std::size_t found = 0;
@@ -61,7 +61,7 @@ TEST(LinePlot, DrawsPointsTooltipsAndLabels) {
 }
 
 TEST(LinePlot, GapsWhereThereIsNoNumber) {
-    const std::string html = line_plot(line_of({1, 2, 3, 4, 5}, {10, nan, infinite, 20, 30}));
+    const std::string html = line_plot(line_of({1, 2, 3, 4, 5}, {10, no_value, no_end, 20, 30}));
     expect_sound(html);
     EXPECT_EQ(count(html, "<title>"), 3u);
     const std::smatch path = [&] {
@@ -86,7 +86,7 @@ TEST(LinePlot, OddSeries) {
          {LinePlot::Scale::linear, LinePlot::Scale::log, LinePlot::Scale::log_at_points})
         for (const std::vector<double>& y : {std::vector<double>{},
                                              {5},
-                                             {nan},
+                                             {no_value},
                                              {0, 0, 0},
                                              {7, 7, 7},
                                              {1e-30, 1e30},
@@ -149,12 +149,13 @@ TEST(BarPlot, StacksItsParts) {
 
 TEST(BarPlot, OddBars) {
     expect_sound(bar_plot(bars_of({})));
-    expect_sound(bar_plot(bars_of({{.label = "none"},
-                                   {.label = "nan", .parts = {nan, infinite}},
-                                   {.label = "negative", .parts = {-5, 2}},
-                                   {.label = "zero", .parts = {0, 0}},
-                                   {.label = "huge", .parts = {1e12, 1}, .low = 1, .high = nan},
-                                   {.label = "limit", .parts = {nan}, .limit = 5, .mark = 9}})));
+    expect_sound(
+        bar_plot(bars_of({{.label = "none"},
+                          {.label = "no_value", .parts = {no_value, no_end}},
+                          {.label = "negative", .parts = {-5, 2}},
+                          {.label = "zero", .parts = {0, 0}},
+                          {.label = "huge", .parts = {1e12, 1}, .low = 1, .high = no_value},
+                          {.label = "limit", .parts = {no_value}, .limit = 5, .mark = 9}})));
     const std::string html = bar_plot(bars_of({{.label = "none"}}));
     EXPECT_NE(html.find("no figure"), std::string::npos);
 }
@@ -186,7 +187,7 @@ TEST(HistogramPlot, OddRows) {
     plot.rows = {{.label = "empty"},
                  {.label = "lengths", .edges = {0, 1}, .counts = {1, 2}},
                  {.label = "falling", .edges = {5, 3}, .counts = {1}},
-                 {.label = "nan", .edges = {0, nan}, .counts = {1}},
+                 {.label = "no_value", .edges = {0, no_value}, .counts = {1}},
                  {.label = "negative", .edges = {0, 1}, .counts = {-1}},
                  {.label = "zero", .edges = {0, 1}, .counts = {0}},
                  {.label = "point", .edges = {4, 4}, .counts = {3}},

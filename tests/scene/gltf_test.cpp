@@ -22,7 +22,7 @@ std::string document(const std::string& nodes, const std::string& primitives,
 const std::string quad_primitive = R"({"attributes":{"POSITION":0},"indices":1})";
 
 Mesh load_document(const std::string& text) { return load(load_gltf_sample, text); }
-std::string error(const std::string& text) { return error_of(load_gltf_sample, text); }
+std::string gltf_error(const std::string& text) { return error_of(load_gltf_sample, text); }
 
 TEST(Gltf, transforms_down_the_tree) {
     const Mesh mesh = load_document(document(
@@ -52,8 +52,8 @@ TEST(Gltf, modes) {
     EXPECT_EQ(load_document(with_mode(0)).vertices.size(), 4u);
     EXPECT_TRUE(load_document(with_mode(0)).triangles.empty());
     EXPECT_TRUE(load_document(with_mode(1)).vertices.empty());
-    EXPECT_EQ(error(with_mode(4)), "sample: meshes 0: 4 indices are not whole triangles");
-    EXPECT_EQ(error(with_mode(7)), "sample: meshes 0: mode 7 is unknown");
+    EXPECT_EQ(gltf_error(with_mode(4)), "sample: meshes 0: 4 indices are not whole triangles");
+    EXPECT_EQ(gltf_error(with_mode(7)), "sample: meshes 0: mode 7 is unknown");
 }
 
 TEST(Gltf, meshes_follow_each_other) {
@@ -171,30 +171,30 @@ TEST(Gltf, infinity_survives_the_identity) {
 
 TEST(Gltf, says_what_is_wrong) {
     const std::string node = R"({"mesh":0})";
-    EXPECT_EQ(error("{"), "sample: JSON: not valid at byte 2");
-    EXPECT_EQ(error("[]"), "sample: JSON: not an object");
-    EXPECT_EQ(error(std::string(100'000, '[')), "sample: JSON: nested deeper than 64 levels");
-    EXPECT_EQ(error(document(R"({"mesh":3})", quad_primitive)),
+    EXPECT_EQ(gltf_error("{"), "sample: JSON: not valid at byte 2");
+    EXPECT_EQ(gltf_error("[]"), "sample: JSON: not an object");
+    EXPECT_EQ(gltf_error(std::string(100'000, '[')), "sample: JSON: nested deeper than 64 levels");
+    EXPECT_EQ(gltf_error(document(R"({"mesh":3})", quad_primitive)),
               "sample: meshes 3: there are only 1");
-    EXPECT_EQ(error(document(R"({"mesh":-1})", quad_primitive)),
+    EXPECT_EQ(gltf_error(document(R"({"mesh":-1})", quad_primitive)),
               "sample: nodes 0: mesh is not an integer from 0 to 2^53");
-    EXPECT_EQ(
-        error(document(R"({"children":[1]},{"children":[2]},{"children":[1]})", quad_primitive)),
-        "sample: nodes 1: is reached twice");
-    EXPECT_EQ(error(document(node, R"({"attributes":{"POSITION":1}})")),
+    EXPECT_EQ(gltf_error(document(R"({"children":[1]},{"children":[2]},{"children":[1]})",
+                                  quad_primitive)),
+              "sample: nodes 1: is reached twice");
+    EXPECT_EQ(gltf_error(document(node, R"({"attributes":{"POSITION":1}})")),
               "sample: accessors 1: its type is not VEC3");
-    EXPECT_EQ(error(document(node, R"({"attributes":{"POSITION":0},"indices":0})")),
+    EXPECT_EQ(gltf_error(document(node, R"({"attributes":{"POSITION":0},"indices":0})")),
               "sample: accessors 0: its type is not SCALAR");
-    EXPECT_EQ(error(document(R"({"mesh":0,"scale":[1,2]})", quad_primitive)),
+    EXPECT_EQ(gltf_error(document(R"({"mesh":0,"scale":[1,2]})", quad_primitive)),
               "sample: nodes 0: scale is not a list of 3 numbers");
-    EXPECT_EQ(error(document(node, quad_primitive,
-                             R"("extensionsRequired":["KHR_draco_mesh_compression"],)")),
+    EXPECT_EQ(gltf_error(document(node, quad_primitive,
+                                  R"("extensionsRequired":["KHR_draco_mesh_compression"],)")),
               "sample: extensionsRequired: KHR_draco_mesh_compression is not read");
 
     const auto changed = [&](const std::string& from, const std::string& to) {
         std::string text = document(node, quad_primitive);
         text.replace(text.find(from), from.size(), to);
-        return error(text);
+        return gltf_error(text);
     };
     EXPECT_EQ(changed("\"count\":4", "\"count\":5"),
               "sample: accessors 0: 5 elements do not fit into its bufferView");
@@ -227,7 +227,7 @@ TEST(Gltf, copies_stay_in_proportion) {
         R"(],"meshes":[{"primitives":[{"mode":0,"attributes":{"POSITION":0}}]}],"accessors":[{"bufferView":0,"componentType":5126,"count":20000,"type":"VEC3"}],)"
         R"("bufferViews":[{"buffer":0,"byteLength":240000}],"buffers":[{"byteLength":240000,"uri":"data:;base64,)" +
         positions + "\"}]}";
-    EXPECT_EQ(error(text),
+    EXPECT_EQ(gltf_error(text),
               "sample: as one mesh: its copies take more than 1000 times the memory of the meshes");
 }
 

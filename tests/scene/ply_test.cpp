@@ -12,12 +12,12 @@ std::string head(const std::string& format, const std::string& elements) {
 }
 const std::string xyz = "property float x\nproperty float y\nproperty float z\n";
 const std::string faces = "property list uchar int vertex_indices\n";
-const std::string three = "0 0 0\n1 0 0\n0 1 0\n";
+const std::string three_corners = "0 0 0\n1 0 0\n0 1 0\n";
 
 TEST(Ply, polygons_are_fanned_and_short_ones_give_nothing) {
     const Mesh mesh =
         load(load_ply, head("ascii", "element vertex 3\n" + xyz + "element face 4\n" + faces) +
-                           three + "0\n1 2\n2 0 1\n5 0 1 2 0 1\n");
+                           three_corners + "0\n1 2\n2 0 1\n5 0 1 2 0 1\n");
     const std::vector<Triangle> expected{{0, 1, 2}, {0, 2, 0}, {0, 0, 1}};
     EXPECT_EQ(mesh.triangles, expected);
 }
@@ -47,7 +47,7 @@ TEST(Ply, strips_with_restarts) {
     const Mesh mesh = load(
         load_ply, head("ascii", "element vertex 4\n" + xyz +
                                     "element tristrips 1\nproperty list int int vertex_indices\n") +
-                      three + "1 1 0\n8 0 1 2 3 -1 1 2 3\n");
+                      three_corners + "1 1 0\n8 0 1 2 3 -1 1 2 3\n");
     EXPECT_EQ(mesh.triangles, (std::vector<Triangle>{{0, 1, 2}, {2, 1, 3}, {1, 2, 3}}));
 }
 
@@ -93,13 +93,15 @@ TEST(Ply, says_what_is_wrong) {
               "sample: vertex 1: \"x\" cannot be z (line 8)");
     EXPECT_EQ(error(head("ascii", vertices) + "0 0 0\n"),
               "sample: vertex 2: file ends after 1 of 3");
+    EXPECT_EQ(error(head("ascii", vertices + "element face 2\n" + faces) + three_corners +
+                    "3 0 1 2\n3 0 1 3\n"),
+              "sample: face 2: index 3 of 3 vertices");
     EXPECT_EQ(
-        error(head("ascii", vertices + "element face 2\n" + faces) + three + "3 0 1 2\n3 0 1 3\n"),
-        "sample: face 2: index 3 of 3 vertices");
-    EXPECT_EQ(error(head("ascii", vertices + "element face 1\n" + faces) + three + "3 0 1 -1\n"),
-              "sample: face 1: index -1 of 3 vertices");
-    EXPECT_EQ(error(head("ascii", vertices + "element face 1\n" + faces) + three + "-3 0 1 2\n"),
-              "sample: face 1: a list of -3 items");
+        error(head("ascii", vertices + "element face 1\n" + faces) + three_corners + "3 0 1 -1\n"),
+        "sample: face 1: index -1 of 3 vertices");
+    EXPECT_EQ(
+        error(head("ascii", vertices + "element face 1\n" + faces) + three_corners + "-3 0 1 2\n"),
+        "sample: face 1: a list of -3 items");
     EXPECT_EQ(error(head("middle_endian", vertices)),
               "sample: line 2: unknown format \"middle_endian\"");
     EXPECT_EQ(error(head("ascii", "element vertex -1\n")),

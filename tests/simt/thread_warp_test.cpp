@@ -26,7 +26,7 @@ constexpr LaneMask all_lanes = 0xFFFFFFFFu;
 struct Count {
     std::uint32_t left = 0, turns = 0;
 };
-using Counter = ThreadWarp<Count, ThreadLane>;
+using CountingWarp = ThreadWarp<Count, ThreadLane>;
 
 /// body(warp) in each lane; the fault, or "".
 template <class Body>
@@ -35,7 +35,7 @@ std::string fault_of(const Body& body) {
     try {
         board.run([&](std::uint32_t lane) {
             ThreadLane::State state{&board, lane, {}};
-            Counter warp;
+            CountingWarp warp;
             warp.hardware.state = &state;
             body(warp);
         });
@@ -49,7 +49,7 @@ bool has_left(const Count& c) { return c.left != 0; }
 
 TEST(ThreadWarp, VotesCountTheMembersOfEachLoop) {
     std::array<std::uint32_t, 32> outer_turns{}, inner_turns{};
-    const std::string fault = fault_of([&](Counter& warp) {
+    const std::string fault = fault_of([&](CountingWarp& warp) {
         const std::uint32_t lane = warp.lane_id();
         warp.lane.left = lane % 4;
         warp.voting_loop(
@@ -79,7 +79,7 @@ TEST(ThreadWarp, VotesCountTheMembersOfEachLoop) {
 TEST(ThreadWarp, AmongAndSharedMemory) {
     std::array<std::uint32_t, 32> shared{};
     std::uint32_t counter = 5, told = 0;
-    const std::string fault = fault_of([&](Counter& warp) {
+    const std::string fault = fault_of([&](CountingWarp& warp) {
         const std::uint32_t lane = warp.lane_id();
         warp.among(0x0000FF00u, [&] {
             EXPECT_EQ(warp.ballot(Op::ballot, [](const Count&) { return true; }), 0x0000FF00u);
@@ -100,20 +100,20 @@ TEST(ThreadWarp, AmongAndSharedMemory) {
 
 TEST(ThreadWarp, AVoteThatNotAllMembersComeToIsSeen) {
     // The others go on to a meeting of all: nobody can come on.
-    const std::string hang = fault_of([](Counter& warp) {
+    const std::string hang = fault_of([](CountingWarp& warp) {
         const auto odd = [&](const Count&) { return warp.lane_id() % 2 == 1; };
         warp.when(odd, [&] { static_cast<void>(warp.any(Op::vote, has_left)); });
         warp.meet();
     });
     EXPECT_NE(hang.find("lane"), std::string::npos) << hang;
     // The others end.
-    const std::string end = fault_of([](Counter& warp) {
+    const std::string end = fault_of([](CountingWarp& warp) {
         const auto odd = [&](const Count&) { return warp.lane_id() % 2 == 1; };
         warp.when(odd, [&] { static_cast<void>(warp.any(Op::vote, has_left)); });
     });
     EXPECT_NE(end.find("ended"), std::string::npos) << end;
     // Some wait with one set of members, some with another.
-    const std::string other = fault_of([](Counter& warp) {
+    const std::string other = fault_of([](CountingWarp& warp) {
         if (warp.lane_id() < 16)
             warp.hardware.meet(all_lanes);
         else
@@ -124,10 +124,10 @@ TEST(ThreadWarp, AVoteThatNotAllMembersComeToIsSeen) {
 }
 
 TEST(ThreadWarp, WrongMembersAreSeen) {
-    const std::string stranger =
-        fault_of([](Counter& warp) { static_cast<void>(warp.hardware.ballot(0x7FFFFFFFu, true)); });
+    const std::string stranger = fault_of(
+        [](CountingWarp& warp) { static_cast<void>(warp.hardware.ballot(0x7FFFFFFFu, true)); });
     EXPECT_NE(stranger.find("no member of its own"), std::string::npos) << stranger;
-    const std::string mixed = fault_of([](Counter& warp) {
+    const std::string mixed = fault_of([](CountingWarp& warp) {
         if (warp.lane_id() == 7)
             warp.hardware.meet(all_lanes);
         else
@@ -135,7 +135,7 @@ TEST(ThreadWarp, WrongMembersAreSeen) {
     });
     EXPECT_NE(mixed.find("lane 7"), std::string::npos) << mixed;
     const std::string asked = fault_of(
-        [](Counter& warp) { static_cast<void>(warp.hardware.broadcast(0xFFFFFF00u, 1, 3)); });
+        [](CountingWarp& warp) { static_cast<void>(warp.hardware.broadcast(0xFFFFFF00u, 1, 3)); });
     EXPECT_NE(asked.find("asks lane 3"), std::string::npos) << asked;
 }
 

@@ -18,7 +18,7 @@ namespace raydix::test {
 namespace {
 
 using Random = std::mt19937_64;
-constexpr std::uint64_t seed = 20261121;
+constexpr std::uint64_t radix_sort_seed = 20261121;
 constexpr std::size_t small_sizes[] = {0, 1, 2, 3, 23, 24, 25, 26, 1000};
 
 /// Makes key i of n; `bits` are free to be set.
@@ -70,7 +70,7 @@ const Pattern patterns[] = {
 
 template <class Key>
 std::vector<Key> make_keys(const Pattern& pattern, std::size_t n, int bits) {
-    Random random(seed);
+    Random random(radix_sort_seed);
     std::vector<Key> keys(n);
     for (std::size_t i = 0; i < n; ++i)
         keys[i] = static_cast<Key>(low_bits(pattern.key(random, i, n, bits), bits));
@@ -111,7 +111,7 @@ void expect_sorted(const Pattern& pattern, std::size_t n, int bits, SortScratch<
     for (const int threads : {1, 2, 7})
         ASSERT_TRUE(sort_by_radix(keys, bits, threads, scratch) == wanted)
             << pattern.name << ", " << n << " keys of " << bits << " bits, " << threads
-            << " threads, seed " << seed;
+            << " threads, seed " << radix_sort_seed;
 }
 
 template <class Key>
@@ -154,8 +154,8 @@ TEST(RadixSort, ScratchIsKeptAndMayBeTooSmallOrTooLarge) {
 }
 
 TEST(RadixSort, ManyRandomShapes) {
-    Random random(seed);
-    std::cout << "seed " << seed << "\n";
+    Random random(radix_sort_seed);
+    std::cout << "seed " << radix_sort_seed << "\n";
     SortScratch<std::uint64_t> scratch;
     for (int round = 0; round < 300; ++round) {
         const auto bits = static_cast<int>(1 + random() % 64);

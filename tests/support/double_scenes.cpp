@@ -7,7 +7,7 @@ namespace raydix::test {
 
 namespace {
 
-Vec3d in_double(Vec3 p) { return {p.x, p.y, p.z}; }
+Vec3d as_double(Vec3 p) { return {p.x, p.y, p.z}; }
 double& coordinate(Vec3d& p, std::size_t axis) { return axis == 0 ? p.x : axis == 1 ? p.y : p.z; }
 
 class RayMaker {
@@ -94,7 +94,7 @@ private:
 
 MeshD in_double(const Mesh& mesh, double scale, Vec3d move) {
     MeshD out{mesh.name, {}, mesh.triangles};
-    for (const Vec3& v : mesh.vertices) out.vertices.push_back(scale * in_double(v) + move);
+    for (const Vec3& v : mesh.vertices) out.vertices.push_back(scale * as_double(v) + move);
     return out;
 }
 

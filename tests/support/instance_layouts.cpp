@@ -11,7 +11,7 @@
 namespace raydix::test {
 namespace {
 
-constexpr std::uint64_t seed = 20140704;
+constexpr std::uint64_t instance_layouts_seed = 20140704;
 
 using Rows3 = std::array<std::array<double, 3>, 3>;
 
@@ -111,13 +111,14 @@ private:
 /// whose triangles meet in planes and have hits at equal t.
 std::vector<MeshD> small_meshes() {
     return {in_double(small_builtin("builtin:figure?triangles=10000")),
-            in_double(random_soup(300, seed, 0.5f)), in_double(lattice_mesh(150, 3, seed), 0.5)};
+            in_double(random_soup(300, instance_layouts_seed, 0.5f)),
+            in_double(lattice_mesh(150, 3, instance_layouts_seed), 0.5)};
 }
 
 /// 4 x 4 x 4 places, each with a map of its own.
 Layout grid(Vec3d middle, double step, const std::function<Rows3(MapMaker&)>& map) {
     Layout layout{small_meshes()};
-    MapMaker maker(seed);
+    MapMaker maker(instance_layouts_seed);
     for (std::size_t i = 0; i < 64; ++i) {
         const Vec3d cell{static_cast<double>(i % 4), static_cast<double>(i / 4 % 4),
                          static_cast<double>(i / 16)};
@@ -132,7 +133,7 @@ Layout grid(Vec3d middle, double step, const std::function<Rows3(MapMaker&)>& ma
 Layout ties() {
     Layout layout{small_meshes()};
     layout.groups.resize(3);
-    MapMaker maker(seed);
+    MapMaker maker(instance_layouts_seed);
     const std::size_t meshes[] = {2, 2, 0};
     for (std::size_t i = 0; i < 6; ++i)
         layout.groups[2].push_back({false, meshes[i % 3], maker.exact()});
@@ -152,7 +153,7 @@ Layout ties() {
 Layout nested(bool masks) {
     Layout layout{small_meshes(), {}, masks};
     layout.groups.resize(3);
-    MapMaker maker(seed);
+    MapMaker maker(instance_layouts_seed);
     const auto mask = [&](std::size_t i) {
         return masks && i % 3 != 0 ? std::uint32_t{3} << maker.below(3) : 0xFFFFFFFFu;
     };
@@ -173,7 +174,7 @@ Layout deep() {
     constexpr std::size_t levels = 8;
     Layout layout{small_meshes()};
     layout.groups.resize(levels);
-    MapMaker maker(seed);
+    MapMaker maker(instance_layouts_seed);
     for (std::size_t k = 0; k < levels; ++k) {
         const Rows3 rows = k % 2 == 0 ? maker.turn() : maker.mirror();
         const Vec3d at = maker.in_cube(1.5);
@@ -209,7 +210,7 @@ Layout offset() {
           Triangle{1, 5, 7}, Triangle{1, 7, 3}})
         cube.push_back(t);
     Layout layout{{{"", corners, square}, {"", corners, cube}}};
-    MapMaker maker(seed);
+    MapMaker maker(instance_layouts_seed);
     for (std::size_t i = 0; i < 32; ++i) {
         const Rows3 rows = i % 4 == 0 ? diagonal(1, 1, 1) : maker.turn();
         const Vec3d at = maker.in_cube(8);

@@ -15,7 +15,7 @@ namespace {
 
 using Cells = std::array<std::uint64_t, 3>;
 
-struct Item {
+struct KdItem {
     Cells cells;
     std::uint32_t id;
     Aabb box;
@@ -56,7 +56,7 @@ struct ReferenceGrid {
 
 class Builder {
 public:
-    Builder(std::vector<Item>& items, const ReferenceGrid& grid, const KdTreeOptions& options)
+    Builder(std::vector<KdItem>& items, const ReferenceGrid& grid, const KdTreeOptions& options)
         : items_(items),
           grid_(grid),
           bits_(options.bits),
@@ -127,7 +127,7 @@ private:
         return unite(left, right);
     }
 
-    std::vector<Item>& items_;
+    std::vector<KdItem>& items_;
     const ReferenceGrid& grid_;
     int bits_;
     std::size_t max_leaf_;
@@ -136,7 +136,7 @@ private:
 };
 
 /// Order of the interleaved codes, without making them: bit by bit, x first; then by id.
-bool code_before(const Item& a, const Item& b, int bits) {
+bool code_before(const KdItem& a, const KdItem& b, int bits) {
     for (int bit = bits / 3 - 1; bit >= 0; --bit)
         for (std::size_t axis = 0; axis < 3; ++axis) {
             const auto x = a.cells[axis] >> bit & 1, y = b.cells[axis] >> bit & 1;
@@ -145,8 +145,8 @@ bool code_before(const Item& a, const Item& b, int bits) {
     return a.id < b.id;
 }
 
-std::vector<Item> items_of(const MeshView& mesh) {
-    std::vector<Item> items;
+std::vector<KdItem> items_of(const MeshView& mesh) {
+    std::vector<KdItem> items;
     const auto add = [&](std::uint32_t id, Vec3 a, Vec3 b, Vec3 c) {
         if (!in_range(a) || !in_range(b) || !in_range(c) || !diagonal_in_range(box_of(a, b, c)))
             return;
@@ -166,7 +166,7 @@ std::vector<Item> items_of(const MeshView& mesh) {
 }  // namespace
 
 KdTree reference_kdtree(const MeshView& mesh, const KdTreeOptions& options) {
-    std::vector<Item> items = items_of(mesh);
+    std::vector<KdItem> items = items_of(mesh);
     const bool points = mesh.triangles.empty();
     KdTree tree;
     const KdTreeInternals access{tree};
@@ -175,13 +175,13 @@ KdTree reference_kdtree(const MeshView& mesh, const KdTreeOptions& options) {
     access.input_count() = points ? mesh.vertices.size() : mesh.triangles.size();
     access.left_out() = access.input_count() - items.size();
     if (items.empty()) return tree;
-    for (const Item& item : items) access.bounds() = unite(tree.bounds(), item.box);
+    for (const KdItem& item : items) access.bounds() = unite(tree.bounds(), item.box);
     const ReferenceGrid grid(tree.bounds(), options.bits / 3);
-    for (Item& item : items)
+    for (KdItem& item : items)
         for (std::size_t axis = 0; axis < 3; ++axis)
             item.cells[axis] = grid.cell(at(center_of(item.box), axis), axis);
     std::ranges::sort(
-        items, [&](const Item& a, const Item& b) { return code_before(a, b, options.bits); });
+        items, [&](const KdItem& a, const KdItem& b) { return code_before(a, b, options.bits); });
     const Builder builder(items, grid, options);
     access.nodes().reset(builder.nodes().size());
     std::ranges::copy(builder.nodes(), access.nodes().data());

@@ -13,7 +13,7 @@
 namespace raydix::test {
 namespace {
 
-struct Item {
+struct KeyedItem {
     std::uint64_t code;
     std::uint32_t id;
 };
@@ -21,7 +21,7 @@ struct Item {
 struct Bucket {
     int level;
     std::uint64_t code;
-    std::vector<Item> items;  // all that is below
+    std::vector<KeyedItem> items;  // all that is below
     std::array<std::unique_ptr<Bucket>, 8> children;
     bool divided = false;
 };
@@ -30,7 +30,7 @@ struct Insertion {
     int axis_bits, max_level;
     std::size_t max_leaf;
 
-    void put_below(Bucket& bucket, Item item) const {
+    void put_below(Bucket& bucket, KeyedItem item) const {
         const int shift = 3 * (axis_bits - bucket.level - 1);
         const std::uint64_t code = item.code >> shift;
         std::unique_ptr<Bucket>& child = bucket.children[code & 7];
@@ -41,12 +41,12 @@ struct Insertion {
         }
         put(*child, item);
     }
-    void put(Bucket& bucket, Item item) const {
+    void put(Bucket& bucket, KeyedItem item) const {
         bucket.items.push_back(item);
         if (bucket.divided) return put_below(bucket, item);
         if (bucket.items.size() <= max_leaf || bucket.level == max_level) return;
         bucket.divided = true;
-        for (const Item& old : bucket.items) put_below(bucket, old);
+        for (const KeyedItem& old : bucket.items) put_below(bucket, old);
     }
 };
 
@@ -61,11 +61,11 @@ void flatten(Bucket& root, ReferenceOctree& tree) {
         Bucket* bucket;
         std::uint32_t parent;
     };
-    std::vector<Item>& items = root.items;
-    std::ranges::sort(items, [](const Item& a, const Item& b) {
+    std::vector<KeyedItem>& items = root.items;
+    std::ranges::sort(items, [](const KeyedItem& a, const KeyedItem& b) {
         return a.code != b.code ? a.code < b.code : a.id < b.id;
     });
-    for (const Item& item : items) tree.order.push_back(item.id);
+    for (const KeyedItem& item : items) tree.order.push_back(item.id);
     std::deque<Waiting> waiting{{&root, no_node}};
     while (!waiting.empty()) {
         const auto [bucket, parent] = waiting.front();
@@ -78,12 +78,12 @@ void flatten(Bucket& root, ReferenceOctree& tree) {
                         static_cast<std::uint32_t>(bucket->items.size()),
                         0,
                         static_cast<std::uint32_t>(bucket->level)};
-        const Item first =
-            *std::ranges::min_element(bucket->items, [](const Item& a, const Item& b) {
+        const KeyedItem first =
+            *std::ranges::min_element(bucket->items, [](const KeyedItem& a, const KeyedItem& b) {
                 return a.code != b.code ? a.code < b.code : a.id < b.id;
             });
         node.first_point = static_cast<std::uint32_t>(
-            std::ranges::lower_bound(items, first.code, {}, &Item::code) - items.begin());
+            std::ranges::lower_bound(items, first.code, {}, &KeyedItem::code) - items.begin());
         if (bucket->divided) node.first_child = at + 1 + static_cast<std::uint32_t>(waiting.size());
         for (std::uint32_t octant = 0; octant < 8; ++octant) {
             if (!bucket->children[octant]) continue;

@@ -12,7 +12,7 @@
 namespace raydix::test {
 namespace {
 
-struct Item {
+struct KeyedPrimitive {
     std::uint64_t code;
     std::uint32_t primitive_id;
     Aabb box;
@@ -33,7 +33,7 @@ std::uint64_t cell_of(float center, float lo, float scale, int bits_per_axis) {
 }
 
 struct Builder {
-    const std::vector<Item>& items;
+    const std::vector<KeyedPrimitive>& items;
     std::size_t max_leaf;
     std::vector<BvhNode> nodes;
     std::uint32_t inner_count = 0;
@@ -75,16 +75,17 @@ struct Builder {
 
 /// boxes [input primitives], unusable ones included -> everything but the copied primitives.
 Bvh build(const std::vector<Aabb>& boxes, PrimitiveKind kind, const BuildOptions& options) {
-    std::vector<Item> items;
+    std::vector<KeyedPrimitive> items;
     Aabb scene = empty_box();
     for (std::size_t i = 0; i < boxes.size(); ++i) {
         if (!usable(boxes[i])) continue;
         scene = unite(scene, boxes[i]);
         items.push_back({0, static_cast<std::uint32_t>(i), boxes[i]});
     }
-    for (Item& item : items) item.code = reference_code(item.box, scene, options.bits);
-    std::stable_sort(items.begin(), items.end(),
-                     [](const Item& a, const Item& b) { return a.code < b.code; });
+    for (KeyedPrimitive& item : items) item.code = reference_code(item.box, scene, options.bits);
+    std::stable_sort(
+        items.begin(), items.end(),
+        [](const KeyedPrimitive& a, const KeyedPrimitive& b) { return a.code < b.code; });
 
     Builder builder{items, static_cast<std::size_t>(options.max_leaf), {}};
     if (!items.empty()) {

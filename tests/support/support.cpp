@@ -33,4 +33,10 @@ Mesh random_soup(std::size_t count, std::uint64_t seed, float size) {
     return mesh;
 }
 
+Mesh laced(Mesh mesh, std::size_t k) {
+    for (std::size_t i = 0; i < mesh.vertices.size(); i += k)
+        mesh.vertices[i].y = i % 2 == 0 ? std::nanf("") : infinity;
+    return mesh;
+}
+
 }  // namespace raydix::test

@@ -40,7 +40,12 @@ inline constexpr std::size_t thorough = 1;
 inline constexpr std::size_t thorough = 20;
 #endif
 
+/// All geometries of a scene.
+inline constexpr std::uint32_t every_mask = 0xFFFFFFFFu;
+
 /// `count` small triangles at random places in the unit cube.
 Mesh random_soup(std::size_t count, std::uint64_t seed, float size = 0.05f);
+/// With every k-th vertex NaN or infinite.
+Mesh laced(Mesh mesh, std::size_t k);
 
 }  // namespace raydix::test

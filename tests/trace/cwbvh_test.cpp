@@ -11,6 +11,7 @@
 #include <random>
 
 #include "layout/cwbvh.h"
+#include "support/bits.h"
 #include "support/cwbvh_trace.h"
 #include "support/quantised_steps.h"
 #include "support/ray_sets.h"
@@ -23,9 +24,7 @@
 namespace raydix::test {
 namespace {
 
-constexpr std::uint64_t seed = 2017;
-
-bool same_bits(const Hit& a, const Hit& b) { return std::memcmp(&a, &b, sizeof(Hit)) == 0; }
+constexpr std::uint64_t cwbvh_seed = 2017;
 
 void expect_like_scalar(const std::string& what, const Bvh& bvh, const Cwbvh& tree,
                         std::span<const Ray> rays, bool some_hit = true) {
@@ -35,7 +34,7 @@ void expect_like_scalar(const std::string& what, const Bvh& bvh, const Cwbvh& tr
     std::uint64_t different = 0;
     for (std::size_t i = 0; i < rays.size(); ++i) different += !same_bits(hits[i], wanted[i]);
     std::cout << what << ": " << rays.size() << " rays, " << counts.hits << " hits, " << different
-              << " wrong (seed " << seed << ")\n";
+              << " wrong (seed " << cwbvh_seed << ")\n";
     EXPECT_EQ(different, 0u) << what;
     EXPECT_EQ(own.hits, counts.hits);
     EXPECT_EQ(own.rays, rays.size());
@@ -54,7 +53,7 @@ void expect_like_scalar(const std::string& what, const Bvh& bvh, const Cwbvh& tr
 
 void expect_like_scalar(const Model& scene, std::size_t rays, const BuildOptions& options = {}) {
     const Bvh bvh = build_bvh(scene.mesh(), options);
-    expect_like_scalar(scene.name, bvh, Cwbvh(bvh), make_mixed_rays(scene, rays, seed));
+    expect_like_scalar(scene.name, bvh, Cwbvh(bvh), make_mixed_rays(scene, rays, cwbvh_seed));
 }
 
 constexpr std::size_t million = thorough == 1 ? 8'000 : 50'000 * thorough;
@@ -85,14 +84,14 @@ TEST(CwbvhTrace, EveryBuilderAndLeafSize) {
 }
 
 TEST(CwbvhTrace, FewTriangles) {
-    const Mesh all = random_soup(30, seed, 1.0f);
+    const Mesh all = random_soup(30, cwbvh_seed, 1.0f);
     for (std::size_t n = 0; n <= 30; ++n) {
         Mesh mesh = all;
         mesh.triangles.resize(n);
         if (n == 0) mesh.vertices.clear();
         const Bvh bvh = build_bvh(mesh);
         expect_like_scalar(std::to_string(n) + " triangles", bvh, Cwbvh(bvh),
-                           make_mixed_rays(scene_of(all, "few"), 2000, seed), n > 0);
+                           make_mixed_rays(scene_of(all, "few"), 2000, cwbvh_seed), n > 0);
     }
 }
 
@@ -114,7 +113,7 @@ TEST(CwbvhTrace, NastyRays) {
                           {{0.5f, 0.5f, -1}, 0, {1e-30f, 1e-25f, 1e-20f}, infinity},
                           {{0.5f, 0.5f, -1}, 0, {1e-45f, 0, 1e-44f}, infinity},
                           {{0.5f, 0.5f, 2}, 0, {0, 0, -most}, infinity}};
-    std::mt19937_64 random(seed);
+    std::mt19937_64 random(cwbvh_seed);
     const auto unit = [&] { return static_cast<float>(random() >> 40) * 0x1p-24f; };
     for (int k = 0; k < 20'000; ++k) {  // along axes, from within and from far off
         Ray ray{{unit(), unit(), unit()}, 0, {0, -0.0f, 0}, infinity};
@@ -146,7 +145,7 @@ TEST(CwbvhTrace, NastyMeshes) {
         Model whole = scene_of(soup, "soup");
         whole.mesh().triangles = {soup.triangles.begin(), soup.triangles.begin() + 400};
         expect_like_scalar("nasty mesh", bvh, Cwbvh(bvh),
-                           make_mixed_rays(whole, fewer(20'000, 8), seed));
+                           make_mixed_rays(whole, fewer(20'000, 8), cwbvh_seed));
     }
 }
 
@@ -163,7 +162,7 @@ TEST(CwbvhTrace, DuplicatedReferences) {
     const Cwbvh tree(bvh);
     EXPECT_EQ(tree.stats().references, 2 * n);
     EXPECT_EQ(tree.stats().triangles, n);
-    const auto rays = make_mixed_rays(scene, 20'000, seed);
+    const auto rays = make_mixed_rays(scene, 20'000, cwbvh_seed);
     EXPECT_TRUE(
         std::ranges::equal(trace(tree, rays), trace(build_bvh(scene.mesh()), rays), same_bits));
 }
@@ -173,7 +172,7 @@ TEST(CwbvhTrace, NoRayLeavesAClosedSurface) {
     for (const Vec3 move : {Vec3{0, 0, 0}, Vec3{1e5f, 1e5f, -1e5f}}) {
         const Mesh mesh = ball_mesh(move);
         const Cwbvh tree(build_bvh(mesh, {.max_leaf = 1}));
-        std::mt19937_64 random(seed);
+        std::mt19937_64 random(cwbvh_seed);
         std::vector<Ray> rays;
         for (std::size_t k = 0; k < (thorough == 1 ? 2'500 : 10'000 * thorough); ++k) {
             const Triangle& t = mesh.triangles[random() % mesh.triangles.size()];
@@ -188,7 +187,7 @@ TEST(CwbvhTrace, NoRayLeavesAClosedSurface) {
 /// The claim of CwbvhRay: a plane as computed is never inside the same plane as slab.h computes it
 /// without a pad, for any node and ray.
 TEST(CwbvhTrace, PlanesStayWithinTheirPad) {
-    std::mt19937_64 random(seed);
+    std::mt19937_64 random(cwbvh_seed);
     const auto unit = [&] { return static_cast<float>(random() >> 40) * 0x1p-24f; };
     std::uint64_t planes = 0;
     for (int turn = 0; turn < 20'000; ++turn) {

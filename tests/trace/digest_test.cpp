@@ -18,7 +18,7 @@
 namespace raydix::test {
 namespace {
 
-constexpr std::uint64_t seed = 12;
+constexpr std::uint64_t digest_seed = 12;
 constexpr std::size_t ray_count = 3000;
 
 template <class T>
@@ -68,7 +68,7 @@ class Digest : public testing::TestWithParam<Digests> {};
 TEST_P(Digest, SceneRaysTreesAndHits) {
     const Digests& wanted = GetParam();
     const Model scene = load_model(wanted.scene);
-    const auto rays = make_mixed_rays(scene, ray_count, seed);
+    const auto rays = make_mixed_rays(scene, ray_count, digest_seed);
     EXPECT_EQ(digest(scene.mesh().vertices), wanted.vertices);
     EXPECT_EQ(digest(rays), wanted.rays);
     EXPECT_EQ(tree_digest(scene.mesh(), Builder::karras), wanted.lbvh);

@@ -13,7 +13,7 @@
 namespace raydix::test {
 namespace {
 
-constexpr std::uint64_t seed = 20130613;
+constexpr std::uint64_t double_slab_seed = 20130613;
 
 std::uint64_t bits(double x) { return std::bit_cast<std::uint64_t>(x); }
 
@@ -40,7 +40,7 @@ RayD random_ray(RandomD& random) {
 }
 
 TEST(DoubleSlabs, TwoAtOnceAsOneByOne) {
-    RandomD random(seed);
+    RandomD random(double_slab_seed);
     std::size_t met = 0;
     for (int i = 0; i < 100'000; ++i) {
         const NodePair pair{node_of(random_box(random)), node_of(random_box(random))};
@@ -64,7 +64,7 @@ TEST(DoubleSlabs, TwoAtOnceAsOneByOne) {
 /// A box of one point, at which a ray is aimed from far away: it must be entered, and not after the
 /// ray is there.
 TEST(DoubleSlabs, NoPointIsMissedOnTheWayToTheCenter) {
-    RandomD random(seed);
+    RandomD random(double_slab_seed);
     for (int i = 0; i < 100'000; ++i) {
         const Vec3d center = 1e6 * random.direction();
         const double scale = i % 2 != 0 ? 0.5 : 1.0;
@@ -80,7 +80,7 @@ TEST(DoubleSlabs, NoPointIsMissedOnTheWayToTheCenter) {
         const BvhNode node = node_of(box_around_center({p, p}, center, scale));
         const auto interval = intersect_slabs(make_slab_frame(local, {node.lo, node.hi}),
                                               &node.lo.x, ray.tmin, ray.tmax);
-        ASSERT_LE(interval.entry, interval.exit) << "seed " << seed << " case " << i;
+        ASSERT_LE(interval.entry, interval.exit) << "seed " << double_slab_seed << " case " << i;
         ASSERT_LE(interval.entry * ray.t_scale, 1.0) << i;
     }
 }

@@ -18,7 +18,7 @@
 namespace raydix::test {
 namespace {
 
-constexpr std::uint64_t seed = 20130521;
+constexpr std::uint64_t double_trace_seed = 20130521;
 constexpr Builder all_builders[] = {
     Builder::karras, Builder::lauterbach, Builder::garanzha, Builder::apetrei, Builder::ploc,
     Builder::hploc,  Builder::binned,     Builder::sweep,    Builder::split,   Builder::sbvh};
@@ -90,14 +90,15 @@ std::vector<Case> cases() {
 
 TEST(DoubleTrace, EveryBuilderLikeEveryTriangle) {
     for (const auto& [name, mesh] : cases()) {
-        const std::vector<RayD> rays = mixed_rays(mesh, fewer(1000 * thorough, 3), seed);
+        const std::vector<RayD> rays =
+            mixed_rays(mesh, fewer(1000 * thorough, 3), double_trace_seed);
         const std::vector<HitD> wanted = trace_brute_force(mesh, rays);
         std::cout << name << ": " << rays.size() << " rays, " << count_hits(wanted) << " hits\n";
         EXPECT_GT(count_hits(wanted), rays.size() / 4) << name;
         for (const Builder builder : all_builders) {
             const BvhD bvh = build_bvh(mesh, {.builder = builder});
             EXPECT_EQ(count_different(trace(bvh, rays), wanted), 0u)
-                << name << ", " << builder_name(builder) << ", seed " << seed;
+                << name << ", " << builder_name(builder) << ", seed " << double_trace_seed;
         }
         for (const Builder builder : {Builder::ploc, Builder::split, Builder::sbvh})
             expect_any_and_all_agree(build_bvh(mesh, {.builder = builder}), mesh, rays, wanted);
@@ -112,8 +113,8 @@ TEST(DoubleTrace, TheRayIsAtTheTriangleWhereItHits) {
     Real worst = 0;
     for (const Vec3d place : {Vec3d{}, utm_place}) {
         const MeshD mesh = slivers_d(1600, 13, place);
-        std::vector<RayD> rays = rays_in_planes(mesh, 5'000 * thorough, seed);
-        const std::vector<RayD> others = mixed_rays(mesh, 500 * thorough, seed);
+        std::vector<RayD> rays = rays_in_planes(mesh, 5'000 * thorough, double_trace_seed);
+        const std::vector<RayD> others = mixed_rays(mesh, 500 * thorough, double_trace_seed);
         rays.insert(rays.end(), others.begin(), others.end());
         const std::vector<HitD> found = trace(build_bvh(mesh), rays);
         for (std::size_t i = 0; i < rays.size(); ++i) {
@@ -131,7 +132,8 @@ TEST(DoubleTrace, TheRayIsAtTheTriangleWhereItHits) {
                 off = std::max(off, std::fabs(Real(found[i].t) * at(rays[i].direction) - point));
                 for (const Real x : {a, b, c}) far = std::max(far, std::fabs(x));
             }
-            ASSERT_LE(off, 64 * 0x1p-53L * 2 * far) << "ray " << i << ", seed " << seed;
+            ASSERT_LE(off, 64 * 0x1p-53L * 2 * far)
+                << "ray " << i << ", seed " << double_trace_seed;
             worst = std::max(worst, off / (0x1p-53L * 2 * far));
         }
     }
@@ -147,8 +149,10 @@ TEST(DoubleTrace, PartsOfTrianglesChangeNoBit) {
     for (const MeshD& mesh :
          {slivers_d(6000, 11, {}), slivers_d(6000, 11),
           with_stray(slivers_d(6000, 12), utm_place + Vec3d{0.0, -900.0, 0.0})}) {
-        std::vector<RayD> rays = rays_in_planes(mesh, fewer(4'000 * thorough, 3), seed);
-        const std::vector<RayD> others = mixed_rays(mesh, fewer(1000 * thorough, 3), seed);
+        std::vector<RayD> rays =
+            rays_in_planes(mesh, fewer(4'000 * thorough, 3), double_trace_seed);
+        const std::vector<RayD> others =
+            mixed_rays(mesh, fewer(1000 * thorough, 3), double_trace_seed);
         rays.insert(rays.end(), others.begin(), others.end());
         const BvhD whole = build_bvh(mesh, {.builder = Builder::sweep});
         const std::vector<HitD> wanted = trace(whole, rays);
@@ -164,7 +168,7 @@ TEST(DoubleTrace, PartsOfTrianglesChangeNoBit) {
             (builder == Builder::split ? split_parts : sbvh_parts) +=
                 bvh.order().size() - mesh.triangles.size();
             EXPECT_EQ(count_different(trace(bvh, rays), wanted), 0u)
-                << builder_name(builder) << ", seed " << seed;
+                << builder_name(builder) << ", seed " << double_trace_seed;
             const AllHitsD own = trace_all(bvh, rays);
             EXPECT_EQ(own.offsets, all.offsets) << builder_name(builder);
             EXPECT_EQ(own.hits, all.hits) << builder_name(builder);
@@ -179,7 +183,7 @@ TEST(DoubleTrace, PartsOfTrianglesChangeNoBit) {
 TEST(DoubleTrace, BuiltinScenesLikeEveryTriangle) {
     for (const Model& scene : builtin_triangle_scenes(10'000)) {
         const MeshD mesh = in_double(scene.mesh(), 1.0, utm_place);
-        const std::vector<RayD> rays = mixed_rays(mesh, 50 * thorough, seed);
+        const std::vector<RayD> rays = mixed_rays(mesh, 50 * thorough, double_trace_seed);
         const std::vector<HitD> hits = trace(build_bvh(mesh), rays);
         EXPECT_GT(count_hits(hits), 0u);
         EXPECT_EQ(count_different(hits, trace_brute_force(mesh, rays)), 0u) << scene.name;
@@ -188,7 +192,7 @@ TEST(DoubleTrace, BuiltinScenesLikeEveryTriangle) {
 
 TEST(DoubleTrace, ThreadsLeavesAndCodesChangeNoBit) {
     const MeshD mesh = in_double(random_soup(3000, 8, 0.2f), 50.0, utm_place);
-    const std::vector<RayD> rays = mixed_rays(mesh, 1000 * thorough, seed);
+    const std::vector<RayD> rays = mixed_rays(mesh, 1000 * thorough, double_trace_seed);
     const std::vector<HitD> wanted = trace(build_bvh(mesh), rays, {.threads = 1});
     const AllHitsD all = trace_all(build_bvh(mesh), rays, {.threads = 1});
     for (const int threads : {1, 3})
@@ -230,7 +234,7 @@ TEST(DoubleTrace, TIsThatOfExactArithmetic) {
     for (const auto& mesh :
          {random_soup_d(60, 11, 0.5), in_double(random_soup(60, 12, 0.5f), 100.0, utm_place)}) {
         const AabbD box = box_of_mesh(mesh);
-        RandomD random(seed);
+        RandomD random(double_trace_seed);
         const BvhD bvh = build_bvh(mesh);
         double worst = 0;
         std::size_t hits = 0;
@@ -243,7 +247,7 @@ TEST(DoubleTrace, TIsThatOfExactArithmetic) {
             for (std::uint32_t k = 0; k < mesh.triangles.size(); ++k)
                 if (exact_hit(mesh, k, ray, t, border) && (best < 0 || t < best))
                     best = t, prim = k;
-            ASSERT_EQ(hit.prim, prim) << "seed " << seed << " ray " << i;
+            ASSERT_EQ(hit.prim, prim) << "seed " << double_trace_seed << " ray " << i;
             if (prim == no_primitive) continue;
             ++hits;
             const double error = static_cast<double>(abs(Exact(hit.t) - best) / best);
@@ -267,7 +271,7 @@ TEST(DoubleTrace, MovedSceneGivesTheSameHitsWhereFloatFails) {
     const MeshD home = gridded(load_model("builtin:figure?triangles=20000").mesh(), 1.0);
     MeshD away = home;
     for (Vec3d& v : away.vertices) v = v + utm_place;
-    std::vector<RayD> rays = mixed_rays(home, 5000 * thorough, seed), moved_rays;
+    std::vector<RayD> rays = mixed_rays(home, 5000 * thorough, double_trace_seed), moved_rays;
     std::vector<Ray> float_rays;
     for (RayD& ray : rays) {
         ray.origin = {std::round(ray.origin.x * 0x1p20) * 0x1p-20,

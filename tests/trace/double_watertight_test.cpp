@@ -13,7 +13,7 @@
 namespace raydix::test {
 namespace {
 
-constexpr std::uint64_t seed = 20120731;
+constexpr std::uint64_t double_watertight_seed = 20120731;
 
 struct Closed {
     MeshD mesh;
@@ -24,7 +24,7 @@ Closed closed_figure(double scale, Vec3d move) {
     const Mesh home = load_model("builtin:figure?triangles=20000").mesh();
     const Bvh bvh = build_bvh(home);
     const Solid solid(bvh);
-    Random random(seed);
+    Random random(double_watertight_seed);
     Closed closed{in_double(home, scale, move), {}};
     while (closed.inside.size() < 100) {
         const Vec3 p = random.in(bvh.bounds());
@@ -42,7 +42,7 @@ Vec3d target(const MeshD& mesh, std::size_t kind, RandomD& random) {
 }
 
 std::vector<RayD> rays_from_inside(const Closed& closed, std::size_t count) {
-    RandomD random(seed);
+    RandomD random(double_watertight_seed);
     std::vector<RayD> rays(count);
     for (std::size_t i = 0; i < count; ++i) {
         const Vec3d from = closed.inside[random.below(closed.inside.size())];
@@ -53,7 +53,7 @@ std::vector<RayD> rays_from_inside(const Closed& closed, std::size_t count) {
 
 /// As far from the mesh as a sun would be.
 std::vector<RayD> rays_from_outside(const Closed& closed, std::size_t count) {
-    RandomD random(seed + 1);
+    RandomD random(double_watertight_seed + 1);
     const AabbD box = box_of_mesh(closed.mesh);
     const double far = 1000.0 * (box.hi.z - box.lo.z);
     std::vector<RayD> rays(count);
@@ -91,7 +91,7 @@ void expect_watertight(const char* name, double scale, Vec3d move) {
     const std::vector<RayD> rays = rays_from_inside(closed, 10'000 * thorough);
     std::size_t leaks = 0;
     for (const HitD& hit : trace(bvh, rays)) leaks += !hit.hit();
-    EXPECT_EQ(leaks, 0u) << name << ", seed " << seed;
+    EXPECT_EQ(leaks, 0u) << name << ", seed " << double_watertight_seed;
     const std::span<const RayD> some = std::span(rays).first(rays.size() / 2);
     const std::size_t inside_wrong = count_wrong_crossings(closed.mesh, bvh, some, 1);
     const std::size_t outside_wrong =

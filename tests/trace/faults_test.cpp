@@ -7,9 +7,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <iostream>
 
+#include "support/bits.h"
 #include "support/line_tree.h"
 #include "support/ray_sets.h"
 #include "support/sanitized.h"
@@ -19,9 +19,7 @@
 namespace raydix::test {
 namespace {
 
-constexpr std::uint64_t seed = 60;
-
-bool same_bits(const Hit& a, const Hit& b) { return std::memcmp(&a, &b, sizeof(Hit)) == 0; }
+constexpr std::uint64_t faults_seed = 60;
 
 /// A box of twelve triangles, wound outward.
 Mesh box_mesh(Vec3 lo, Vec3 hi) {
@@ -85,7 +83,7 @@ TEST(RayFaults, ZeroComponentsGiveNoNaN) {
 }
 
 TEST(RayFaults, NaNTrianglePoisonsNoBox) {
-    const Model clean = scene_of(random_soup(200, seed, 0.5f), "soup");
+    const Model clean = scene_of(random_soup(200, faults_seed, 0.5f), "soup");
     Mesh poisoned = clean.mesh();
     const float nan = std::nanf("");
     for (const Vec3 bad : {Vec3{nan, 0, 0}, Vec3{0, infinity, 0}, Vec3{0, 0, -infinity},
@@ -94,7 +92,7 @@ TEST(RayFaults, NaNTrianglePoisonsNoBox) {
         poisoned.vertices.push_back(bad);
         poisoned.triangles.push_back({0, 1, v});
     }
-    const auto rays = make_mixed_rays(clean, fewer(20'000, 8), seed);
+    const auto rays = make_mixed_rays(clean, fewer(20'000, 8), faults_seed);
     const Bvh bvh = build_bvh(poisoned);
     EXPECT_EQ(bvh.left_out(), 5u);
     const auto wanted = trace(build_bvh(clean.mesh()), rays);
@@ -104,12 +102,12 @@ TEST(RayFaults, NaNTrianglePoisonsNoBox) {
 }
 
 TEST(RayFaults, VeryFewTriangles) {
-    const Mesh all = random_soup(5, seed, 2.0f);
+    const Mesh all = random_soup(5, faults_seed, 2.0f);
     for (std::size_t n = 0; n <= 5; ++n) {
         Mesh mesh = all;
         mesh.triangles.resize(n);
         if (n == 0) mesh.vertices.clear();
-        const auto rays = make_mixed_rays(scene_of(all, "five"), 2000, seed);
+        const auto rays = make_mixed_rays(scene_of(all, "five"), 2000, faults_seed);
         expect_brute_force(mesh, rays, n > 0);
         const AllHits hits = trace_all(build_bvh(mesh), rays);
         EXPECT_EQ(hits.hits.empty(), n == 0);
@@ -169,14 +167,14 @@ TEST(RayFaults, HundredsOfThousandsOfEqualTriangles) {
 
 /// 30-bit codes of a few metres at coordinates of 5e6 fall into few cells.
 TEST(RayFaults, GpsCoordinatesCollapseCodes) {
-    Mesh mesh = moved(random_soup(3000, seed, 8.0f), {0, 0, 0});
+    Mesh mesh = moved(random_soup(3000, faults_seed, 8.0f), {0, 0, 0});
     for (Vec3& p : mesh.vertices) p = {500'000 + 30 * p.x, 5'400'000 + 30 * p.y, 300 + 30 * p.z};
     mesh.vertices.push_back({-1e7f, -1e7f, -1e7f});  // far away: the grid's cells are large
     mesh.vertices.push_back({-1e7f, -1e7f + 1, -1e7f});
     mesh.vertices.push_back({-1e7f + 1, -1e7f, -1e7f});
     const auto v = static_cast<std::uint32_t>(mesh.vertices.size());
     Model scene = scene_of(mesh, "GPS");
-    const auto rays = make_rays(scene, RaySet::at_vertex, fewer(500 * thorough, 4), seed);
+    const auto rays = make_rays(scene, RaySet::at_vertex, fewer(500 * thorough, 4), faults_seed);
     mesh.triangles.push_back({v - 3, v - 2, v - 1});
     expect_brute_force(mesh, rays);
 }

@@ -10,6 +10,7 @@
 #include <set>
 #include <tuple>
 
+#include "support/bits.h"
 #include "support/line_tree.h"
 #include "support/ray_sets.h"
 #include "support/sanitized.h"
@@ -19,9 +20,7 @@
 namespace raydix::test {
 namespace {
 
-constexpr std::uint64_t seed = 4242;
-
-bool same_bits(const Hit& a, const Hit& b) { return std::memcmp(&a, &b, sizeof(Hit)) == 0; }
+constexpr std::uint64_t hits_seed = 4242;
 
 /// Prints the line of the comparison; fails on any difference, on no hits and on an empty scene.
 void expect_same_hits(const std::string& what, std::span<const Ray> rays, std::span<const Hit> ours,
@@ -41,7 +40,7 @@ void expect_same_hits(const std::string& what, std::span<const Ray> rays, std::s
     }
     std::cout << what << ": " << rays.size() << " rays, " << hits << " hits, "
               << rays.size() - different << " exact, 0 ties, " << different << " wrong (seed "
-              << seed << ")\n";
+              << hits_seed << ")\n";
     EXPECT_GT(hits, 0u) << what;
     EXPECT_EQ(different, 0u) << what;
 }
@@ -87,7 +86,7 @@ void expect_like_brute_force(const Model& scene, std::size_t ray_count) {
     ASSERT_FALSE(scene.mesh().triangles.empty()) << scene.name;
     const Bvh bvh = build_bvh(scene.mesh());
     const LineTree line_tree(scene.mesh());
-    const std::vector<Ray> rays = make_mixed_rays(scene, ray_count, seed);
+    const std::vector<Ray> rays = make_mixed_rays(scene, ray_count, hits_seed);
     const std::vector<Hit> ours = trace(bvh, rays);
     const std::string name = scene.name + ", " + std::to_string(scene.mesh().triangles.size()) +
                              " triangles, against float brute force";
@@ -106,7 +105,7 @@ TEST(Hits, LineTreeAgreesWithEveryTriangle) {
         const bool small = scene.mesh().triangles.size() < 1000;
         const std::size_t per_thorough = small ? 2000 : 100;
         const auto rays = make_mixed_rays(
-            scene, thorough == 1 ? per_thorough / 4 : per_thorough * thorough, seed);
+            scene, thorough == 1 ? per_thorough / 4 : per_thorough * thorough, hits_seed);
         expect_same_hits(scene.name + ", line tree against trace_brute_force", rays,
                          LineTree(scene.mesh()).closest(rays),
                          trace_brute_force(scene.mesh(), rays));
@@ -116,7 +115,7 @@ TEST(Hits, LineTreeAgreesWithEveryTriangle) {
 TEST(Hits, SoupAgainstEveryTriangle) {
     const Model scene = scene_of(random_soup(2000, 12, 0.3f), "soup of 2000");
     const auto rays =
-        make_mixed_rays(scene, thorough == 1 ? fewer(3000, 4) : 10'000 * thorough, seed);
+        make_mixed_rays(scene, thorough == 1 ? fewer(3000, 4) : 10'000 * thorough, hits_seed);
     expect_same_hits(scene.name + " against trace_brute_force", rays,
                      trace(build_bvh(scene.mesh()), rays), trace_brute_force(scene.mesh(), rays));
 }
@@ -149,7 +148,7 @@ std::vector<Hit> hits_with(const Mesh& mesh, std::span<const Ray> rays, const Bu
 
 TEST(Hits, FaultResultsDifferByThreadCount) {
     const Model scene = load_model("builtin:atrium?triangles=10000");
-    const auto rays = make_mixed_rays(scene, thorough == 1 ? 1500 : 5000 * thorough, seed);
+    const auto rays = make_mixed_rays(scene, thorough == 1 ? 1500 : 5000 * thorough, hits_seed);
     const Bvh bvh = build_bvh(scene.mesh());
     const auto wanted = trace(bvh, rays, {.threads = 1});
     const AllHits all_wanted = trace_all(bvh, rays, {.threads = 1});
@@ -165,7 +164,7 @@ TEST(Hits, LeafSizeAndCodeBitsChangeNoBit) {
     for (const Model& scene : {load_model("builtin:grove?triangles=10000"),
                                scene_of(lattice_mesh(fewer(3000, 3), 12, 8), "lattice")}) {
         const auto rays =
-            make_mixed_rays(scene, thorough == 1 ? fewer(1500, 3) : 5000 * thorough, seed);
+            make_mixed_rays(scene, thorough == 1 ? fewer(1500, 3) : 5000 * thorough, hits_seed);
         const auto wanted = hits_with(scene.mesh(), rays, {}, 1);
         for (const int bits : {30, 63})
             for (const int max_leaf : {1, 4, 255})
@@ -178,7 +177,7 @@ TEST(Hits, LeafSizeAndCodeBitsChangeNoBit) {
 
 TEST(Hits, OneByOneAndWithCountersAsInBatches) {
     const Model scene = scene_of(random_soup(500, 6, 0.4f), "soup");
-    const auto rays = make_mixed_rays(scene, 3000, seed);
+    const auto rays = make_mixed_rays(scene, 3000, hits_seed);
     const Bvh bvh = build_bvh(scene.mesh());
     const auto wanted = trace(bvh, rays);
     std::vector<Hit> counted(rays.size());
@@ -194,7 +193,7 @@ TEST(Hits, OneByOneAndWithCountersAsInBatches) {
 
 TEST(Hits, OrderOfTrianglesDecidesOnlyTheNames) {
     Model scene = scene_of(random_soup(2000, 7), "soup");
-    const auto rays = make_mixed_rays(scene, 50'000, seed);
+    const auto rays = make_mixed_rays(scene, 50'000, hits_seed);
     const auto wanted = trace(build_bvh(scene.mesh()), rays);
     std::ranges::reverse(scene.mesh().triangles);
     const auto turned = trace(build_bvh(scene.mesh()), rays);

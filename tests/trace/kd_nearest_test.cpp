@@ -16,7 +16,7 @@
 namespace raydix::test {
 namespace {
 
-constexpr std::uint64_t seed = 31;
+constexpr std::uint64_t kd_nearest_seed = 31;
 
 std::size_t differences(std::span<const KdNeighbor> a, std::span<const KdNeighbor> b) {
     std::size_t count = a.size() == b.size() ? 0 : 1;
@@ -28,8 +28,8 @@ std::size_t differences(std::span<const KdNeighbor> a, std::span<const KdNeighbo
 
 TEST(KdNearest, LikeEveryPoint) {
     std::size_t rows = 0;
-    for (const PointSet& set : point_sets(50 * thorough, seed)) {
-        const auto queries = queries_for(set.points, 40 + 8 * thorough, seed + 1);
+    for (const PointSet& set : point_sets(50 * thorough, kd_nearest_seed)) {
+        const auto queries = queries_for(set.points, 40 + 8 * thorough, kd_nearest_seed + 1);
         for (const std::uint32_t k : {1u, 2u, 8u, 33u, 2000u}) {
             const auto wanted = nearest_of_all(set.points, queries, k);
             for (const int bits : {30, 63})
@@ -38,19 +38,19 @@ TEST(KdNearest, LikeEveryPoint) {
                         build_kdtree(set.points, {.bits = bits, .max_leaf = max_leaf});
                     EXPECT_EQ(differences(kd_nearest(tree, queries, k), wanted), 0u)
                         << set.name << ", " << set.points.size() << " points, k " << k << ", bits "
-                        << bits << ", max_leaf " << max_leaf << ", seed " << seed;
+                        << bits << ", max_leaf " << max_leaf << ", seed " << kd_nearest_seed;
                     rows += queries.size();
                 }
         }
     }
-    std::cout << rows << " rows compared, seed " << seed << "\n";
+    std::cout << rows << " rows compared, seed " << kd_nearest_seed << "\n";
 }
 
 TEST(KdNearest, ThreadsAndCountersChangeNothing) {
-    const auto sets = point_sets(500 * thorough, seed);
+    const auto sets = point_sets(500 * thorough, kd_nearest_seed);
     for (const PointSet& set : sets) {
         const KdTree tree = build_kdtree(set.points);
-        const auto queries = queries_for(set.points, 100 * thorough, seed);
+        const auto queries = queries_for(set.points, 100 * thorough, kd_nearest_seed);
         const auto wanted = kd_nearest(tree, queries, 8, {.threads = 1});
         const auto invalid = static_cast<std::uint64_t>(
             std::ranges::count_if(queries, [](Vec3 q) { return !std::isfinite(q.x + q.y + q.z); }));
@@ -109,7 +109,7 @@ TEST(KdNearest, MeetsFewOfAMillionEqualPoints) {
 }
 
 TEST(KdNearest, VisitsGrowLikeTheDepth) {
-    const auto sets = point_sets(5000 * thorough, seed);
+    const auto sets = point_sets(5000 * thorough, kd_nearest_seed);
     const auto uniform =
         std::ranges::find(sets, std::string("uniform"), [](const PointSet& s) { return s.name; });
     const KdTree tree = build_kdtree(uniform->points);

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <iostream>
 
+#include "support/bits.h"
 #include "support/line_tree.h"
 #include "support/ray_sets.h"
 #include "support/sanitized.h"
@@ -17,9 +18,7 @@
 namespace raydix::test {
 namespace {
 
-constexpr std::uint64_t seed = 515;
-
-bool same_bits(const Hit& a, const Hit& b) { return std::memcmp(&a, &b, sizeof(Hit)) == 0; }
+constexpr std::uint64_t kd_rays_seed = 515;
 
 void expect_same(const std::string& what, const KdTree& tree, std::span<const Ray> rays,
                  std::span<const Hit> wanted) {
@@ -33,15 +32,15 @@ void expect_same(const std::string& what, const KdTree& tree, std::span<const Ra
         wrong_any += (occluded[i] != 0) != wanted[i].hit();
     }
     std::cout << what << ": " << rays.size() << " rays, " << hits << " hits, " << wrong << " and "
-              << wrong_any << " wrong (seed " << seed << ")\n";
+              << wrong_any << " wrong (seed " << kd_rays_seed << ")\n";
     EXPECT_GT(hits, 0u) << what;
     EXPECT_EQ(wrong, 0u) << what;
     EXPECT_EQ(wrong_any, 0u) << what;
     EXPECT_EQ(any.hits, hits) << what;
 }
 
-void expect_like_brute_force(const Model& scene, std::size_t ray_count) {
-    const auto rays = make_mixed_rays(scene, ray_count, seed);
+void expect_kd_like_brute_force(const Model& scene, std::size_t ray_count) {
+    const auto rays = make_mixed_rays(scene, ray_count, kd_rays_seed);
     const auto wanted = LineTree(scene.mesh()).closest(rays);
     for (const int max_leaf : {1, 8})
         for (const int bits : {30, 63})
@@ -53,40 +52,41 @@ void expect_like_brute_force(const Model& scene, std::size_t ray_count) {
 
 TEST(KdRays, SoupAgainstEveryTriangle) {
     const Model scene = scene_of(random_soup(2000, 12, 0.3f), "soup of 2000");
-    const auto rays = make_mixed_rays(scene, fewer(2000 * thorough, 4), seed);
+    const auto rays = make_mixed_rays(scene, fewer(2000 * thorough, 4), kd_rays_seed);
     expect_same(scene.name + " against trace_brute_force", build_kdtree(scene.mesh()), rays,
                 trace_brute_force(scene.mesh(), rays));
 }
 
 TEST(KdRays, SoupsLikeBruteForce) {
     const std::size_t rays = thorough == 1 ? fewer(1200, 4) : 5000 * thorough;
-    expect_like_brute_force(scene_of(random_soup(2000, 1), "soup"), rays);
-    expect_like_brute_force(scene_of(random_soup(2000, 2, 1.0f), "soup of large ones"), rays);
-    expect_like_brute_force(scene_of(lattice_mesh(2000, 20, 5), "lattice"), rays);
-    expect_like_brute_force(
+    expect_kd_like_brute_force(scene_of(random_soup(2000, 1), "soup"), rays);
+    expect_kd_like_brute_force(scene_of(random_soup(2000, 2, 1.0f), "soup of large ones"), rays);
+    expect_kd_like_brute_force(scene_of(lattice_mesh(2000, 20, 5), "lattice"), rays);
+    expect_kd_like_brute_force(
         scene_of(moved(random_soup(2000, 4), {1e5f, -2e5f, 5e6f}), "soup far off"), rays);
-    expect_like_brute_force(scene_of(scaled(random_soup(2000, 4), 1e-9f), "tiny soup"), rays);
-    expect_like_brute_force(scene_of(scaled(random_soup(2000, 4), 1e12f), "huge soup"), rays);
+    expect_kd_like_brute_force(scene_of(scaled(random_soup(2000, 4), 1e-9f), "tiny soup"), rays);
+    expect_kd_like_brute_force(scene_of(scaled(random_soup(2000, 4), 1e12f), "huge soup"), rays);
 }
 
 TEST(KdRays, BuiltinScenesLikeBruteForce) {
     const auto scenes = builtin_triangle_scenes(1000 * thorough);
     EXPECT_GE(scenes.size(), 4u);
     for (const Model& scene : scenes)
-        expect_like_brute_force(scene, thorough == 1 ? fewer(2000, 4) : 10'000 * thorough);
+        expect_kd_like_brute_force(scene, thorough == 1 ? fewer(2000, 4) : 10'000 * thorough);
 }
 
 TEST(KdRays, SharedBunnyLikeTheBvh) {
     const auto file = shared_scene("bunny/bunny.ply.xz");
     RAYDIX_SKIP_WITHOUT(file);
     const Model scene = load_model(file.string());
-    const auto rays = make_mixed_rays(scene, thorough == 1 ? 8000 : 25'000 * thorough, seed);
+    const auto rays =
+        make_mixed_rays(scene, thorough == 1 ? 8000 : 25'000 * thorough, kd_rays_seed);
     expect_same("bunny", build_kdtree(scene.mesh()), rays, trace(build_bvh(scene.mesh()), rays));
 }
 
 TEST(KdRays, ThreadsAndCountersChangeNothing) {
     const Model scene = load_model("builtin:grove?triangles=10000");
-    const auto rays = make_mixed_rays(scene, 2000 * thorough, seed);
+    const auto rays = make_mixed_rays(scene, 2000 * thorough, kd_rays_seed);
     const KdTree tree = build_kdtree(scene.mesh());
     const auto wanted = kd_trace(tree, rays, {.threads = 1});
     TraceCounts first;

@@ -6,11 +6,11 @@
 #include <raydix/trace.h>
 
 #include <algorithm>
-#include <cstring>
 #include <iostream>
 #include <random>
 
 #include "primitives/sources.h"
+#include "support/bits.h"
 #include "support/scenes.h"
 #include "support/support.h"
 #include "trace/triangle_test.h"
@@ -19,8 +19,6 @@ namespace raydix::test {
 namespace {
 
 using Random = std::mt19937_64;
-
-bool same_bits(const Hit& a, const Hit& b) { return std::memcmp(&a, &b, sizeof(Hit)) == 0; }
 
 /// Integer origins and directions; some between lattice points, some with limits that are hit
 /// exactly.

@@ -21,7 +21,7 @@
 namespace raydix::test {
 namespace {
 
-constexpr std::uint64_t seed = 12;
+constexpr std::uint64_t mesh_digest_seed = 12;
 constexpr std::size_t ray_count = 1500, rays_to_hits = 150;
 
 template <class Hits>
@@ -79,11 +79,11 @@ Answer any(const KdTree& tree, const std::vector<Ray>& rays, const TraceOptions&
 MeshD mesh_named(const std::string& name) {
     if (name == "atrium") return in_double(small_builtin("builtin:atrium?triangles=10000"));
     if (name == "grove") return in_double(small_builtin("builtin:grove?triangles=10000"));
-    if (name == "lattice") return in_double(lattice_mesh(400, 4, seed));
+    if (name == "lattice") return in_double(lattice_mesh(400, 4, mesh_digest_seed));
     if (name == "far figure")
         return in_double(small_builtin("builtin:figure?triangles=10000"), 1.0 / 3.0, utm_place);
-    if (name == "far slivers") return slivers_d(1000, seed);
-    return random_soup_d(1000, seed, 0.3);
+    if (name == "far slivers") return slivers_d(1000, mesh_digest_seed);
+    return random_soup_d(1000, mesh_digest_seed, 0.3);
 }
 
 /// A float mesh, its rays, and trees of every kind that may be asked.
@@ -100,7 +100,7 @@ struct FloatTrees {
     std::unique_ptr<Cwbvh> compressed;
 
     explicit FloatTrees(const MeshD& wide_mesh) : mesh(in_float(wide_mesh)) {
-        rays = in_float(digest_rays(wide_mesh, ray_count, seed));
+        rays = in_float(digest_rays(wide_mesh, ray_count, mesh_digest_seed));
         for (const Builder builder :
              {Builder::karras, Builder::ploc, Builder::binned, Builder::split, Builder::sbvh})
             binary.emplace_back(builder, build_bvh(mesh, {.builder = builder}));
@@ -167,7 +167,7 @@ struct DoubleTrees {
     std::vector<std::pair<Builder, BvhD>> trees;
 
     explicit DoubleTrees(MeshD of) : mesh(std::move(of)) {
-        rays = digest_rays(mesh, ray_count, seed);
+        rays = digest_rays(mesh, ray_count, mesh_digest_seed);
         for (const Builder builder :
              {Builder::karras, Builder::ploc, Builder::binned, Builder::split, Builder::sbvh})
             trees.emplace_back(builder, build_bvh(mesh, {.builder = builder}));

@@ -23,7 +23,7 @@
 namespace raydix::test {
 namespace {
 
-constexpr std::uint64_t seed = 777;
+constexpr std::uint64_t oracle_seed = 777;
 
 /// Rays that are not aimed at edges or limits: hardly any may be excused as grazing.
 bool is_ordinary(RaySet set) { return set == RaySet::camera || set == RaySet::through_box; }
@@ -50,7 +50,7 @@ void expect_like(const Model& scene, const std::string& peer, std::size_t rays_p
         const auto set = static_cast<RaySet>(k);
         // Both judges stop short of float's limits: 1e-30 to 1e30 is for the bit comparisons.
         if (set == RaySet::any_length) continue;
-        const auto rays = make_rays(scene, set, rays_per_set, seed);
+        const auto rays = make_rays(scene, set, rays_per_set, oracle_seed);
         const std::vector<Hit> ours = trace(bvh, rays), theirs = other(rays);
         const Tally tally = compare(scene.mesh(), rays, ours, theirs);
         EXPECT_EQ(tally.wrong, 0u) << scene.name << ", " << name_of(set) << "\n"
@@ -96,7 +96,7 @@ TEST(Oracle, KnowsARightAngledTriangle) {
 
 TEST(Oracle, FindsPlantedFaults) {
     const Model scene = scene_of(random_soup(300, 5, 0.5f), "soup");
-    const auto rays = make_rays(scene, RaySet::through_box, 2000, seed);
+    const auto rays = make_rays(scene, RaySet::through_box, 2000, oracle_seed);
     const auto good = trace(build_bvh(scene.mesh()), rays);
     const auto wrong_after = [&](auto&& spoil) {
         auto bad = good;
@@ -157,7 +157,7 @@ TEST_P(SharedSceneHits, LikeFloatBruteForce) {
     RAYDIX_SKIP_WITHOUT(file);
     const Model scene = load(file);
     ASSERT_FALSE(scene.mesh().triangles.empty());
-    const auto rays = make_mixed_rays(scene, thorough > 1 ? 50'000 * thorough : 5'000, seed);
+    const auto rays = make_mixed_rays(scene, thorough > 1 ? 50'000 * thorough : 5'000, oracle_seed);
     const std::vector<Hit> ours = trace(build_bvh(scene.mesh()), rays);
     const std::vector<Hit> wanted = LineTree(scene.mesh()).closest(rays);
     std::uint64_t hits = 0, different = 0;
@@ -171,7 +171,7 @@ TEST_P(SharedSceneHits, LikeFloatBruteForce) {
     std::cout << scene.name << ", " << scene.mesh().triangles.size()
               << " triangles, against float brute force: " << rays.size() << " rays, " << hits
               << " hits, " << rays.size() - different << " exact, 0 ties, " << different
-              << " wrong (seed " << seed << ")\n";
+              << " wrong (seed " << oracle_seed << ")\n";
     EXPECT_GT(hits, 0u);
     EXPECT_EQ(different, 0u);
 }

@@ -12,6 +12,7 @@
 #include <random>
 
 #include "layout/wide_bvh.h"
+#include "support/bits.h"
 #include "support/float_control.h"
 #include "support/ray_sets.h"
 #include "support/sanitized.h"
@@ -22,18 +23,16 @@
 namespace raydix::test {
 namespace {
 
-constexpr std::uint64_t seed = 2021;
+constexpr std::uint64_t simd_seed = 2021;
 constexpr SimdPath paths[] = {SimdPath::automatic, SimdPath::single, SimdPath::packet,
                               SimdPath::stream, SimdPath::sorted};
-
-bool same_bits(const Hit& a, const Hit& b) { return std::memcmp(&a, &b, sizeof(Hit)) == 0; }
 
 /// Everything that `simd` can do with a batch, by one path and instruction set.
 void expect_like(const std::string& what, const WideBvh& tree, std::span<const Ray> rays,
                  std::span<const Hit> wanted, const TraceCounts& counts,
                  const TraceOptions& options) {
     SCOPED_TRACE(what + ", path " + std::string(simd_path_name(options.path)) + ", " + options.isa +
-                 ", seed " + std::to_string(seed));
+                 ", seed " + std::to_string(simd_seed));
     std::vector<Hit> hits(rays.size());
     const TraceCounts own = trace(tree, rays, hits, options);
     std::uint64_t different = 0;
@@ -63,8 +62,8 @@ void expect_like_scalar(const std::string& what, const Bvh& bvh, std::span<const
                         bool some_hit = true) {
     std::vector<Hit> wanted(rays.size());
     const TraceCounts counts = trace(bvh, rays, wanted);
-    std::cout << what << ": " << rays.size() << " rays, " << counts.hits << " hits (seed " << seed
-              << ")\n";
+    std::cout << what << ": " << rays.size() << " rays, " << counts.hits << " hits (seed "
+              << simd_seed << ")\n";
     if (some_hit) {
         EXPECT_GT(counts.hits, 0u);
     }
@@ -87,7 +86,7 @@ void expect_like_scalar(const std::string& what, const Bvh& bvh, std::span<const
 
 void expect_like_scalar(const Model& scene, std::size_t rays, const BuildOptions& options = {}) {
     expect_like_scalar(scene.name, build_bvh(scene.mesh(), options),
-                       make_mixed_rays(scene, rays, seed));
+                       make_mixed_rays(scene, rays, simd_seed));
 }
 
 constexpr std::size_t many = sanitized ? 500 : thorough == 1 ? 2'000 : 4'000 * thorough;
@@ -138,20 +137,20 @@ TEST(Simd, EveryBuilderAndLeafSize) {
 }
 
 TEST(Simd, FewTriangles) {
-    const Mesh all = random_soup(30, seed, 1.0f);
+    const Mesh all = random_soup(30, simd_seed, 1.0f);
     for (std::size_t n = 0; n <= 30; ++n) {
         Mesh mesh = all;
         mesh.triangles.resize(n);
         if (n == 0) mesh.vertices.clear();
         expect_like_scalar(std::to_string(n) + " triangles", build_bvh(mesh),
-                           make_mixed_rays(scene_of(all, "few"), 1000, seed), n > 0);
+                           make_mixed_rays(scene_of(all, "few"), 1000, simd_seed), n > 0);
     }
 }
 
 /// Limits beside t: what floats decide of any hit must be what the whole test says. Large and thin
 /// triangles, rays that start next to them and far off, scenes of all sizes.
 TEST(Simd, LimitsBesideTheHit) {
-    std::mt19937_64 random(seed);
+    std::mt19937_64 random(simd_seed);
     const auto unit = [&] { return static_cast<float>(random() >> 40) * 0x1p-24f; };
     const auto point = [&](float size) {
         return Vec3{size * (2 * unit() - 1), size * (2 * unit() - 1), size * (2 * unit() - 1)};
@@ -199,7 +198,7 @@ TEST(Simd, BatchesOfEverySize) {
     const Model scene = scene_of(random_soup(2000, 9, 0.2f), "soup");
     const Bvh bvh = build_bvh(scene.mesh());
     const std::size_t most = sanitized ? 10'000 : 40'000;
-    const auto rays = make_mixed_rays(scene, most, seed);
+    const auto rays = make_mixed_rays(scene, most, simd_seed);
     for (const std::size_t n : std::initializer_list<std::size_t>{0, 1, 2, 3, 4, 5, 15, 16, 17, 63,
                                                                   64, 65, 1023, 1024, 1025, most})
         expect_like_scalar(std::to_string(n) + " rays", bvh, std::span(rays).first(n), n > 60);
@@ -226,7 +225,7 @@ TEST(Simd, NastyRays) {
                           {{0.5f, 0.5f, -1}, 0, {1e-30f, 1e-25f, 1e-20f}, infinity},
                           {{0.5f, 0.5f, -1}, 0, {1e-45f, 0, 1e-44f}, infinity},
                           {{0.5f, 0.5f, 2}, 0, {0, 0, -most}, infinity}};
-    std::mt19937_64 random(seed);
+    std::mt19937_64 random(simd_seed);
     const auto unit = [&] { return static_cast<float>(random() >> 40) * 0x1p-24f; };
     for (int k = 0; k < 20'000; ++k) {  // along axes, from within and from far off
         Ray ray{{unit(), unit(), unit()}, 0, {0, -0.0f, 0}, infinity};
@@ -268,7 +267,7 @@ void expect_alone_like_scalar(const Bvh& bvh, std::span<const Ray> rays) {
 
 TEST(Simd, RaysThatEndWhereTheyBegin) {
     std::vector<Ray> rays;
-    std::mt19937_64 random(seed);
+    std::mt19937_64 random(simd_seed);
     const auto unit = [&] { return static_cast<float>(random() >> 40) * 0x1p-24f; };
     for (int k = 0; k < 800; ++k) {
         const auto zero = [&](int bit) { return k >> bit & 1 ? -0.0f : 0.0f; };
@@ -287,7 +286,7 @@ TEST(Simd, RaysThatEndWhereTheyBegin) {
 TEST(Simd, RaysAloneLikeScalar) {
     for (const std::uint64_t number : {1, 2, 3}) {
         const Model scene = scene_of(random_soup(2000, number, number == 3 ? 1.0f : 0.2f), "soup");
-        expect_alone_like_scalar(build_bvh(scene.mesh()), make_mixed_rays(scene, 400, seed));
+        expect_alone_like_scalar(build_bvh(scene.mesh()), make_mixed_rays(scene, 400, simd_seed));
     }
 }
 
@@ -309,15 +308,15 @@ TEST(Simd, NastyMeshes) {
         Model whole = scene_of(soup, "soup");
         whole.mesh().triangles = {soup.triangles.begin(), soup.triangles.begin() + 400};
         expect_like_scalar("nasty mesh", build_bvh(mesh),
-                           make_mixed_rays(whole, sanitized ? 2'000 : 10'000, seed));
+                           make_mixed_rays(whole, sanitized ? 2'000 : 10'000, simd_seed));
     }
     Mesh none = soup;  // all without area: a tree without leaves
     for (Triangle& t : none.triangles) t[2] = t[1];
     const Bvh bvh = build_bvh(none);
     const WideBvh tree(bvh);
     EXPECT_TRUE(tree.empty());
-    expect_like_scalar("flat triangles", bvh, make_mixed_rays(scene_of(soup, "soup"), 3000, seed),
-                       false);
+    expect_like_scalar("flat triangles", bvh,
+                       make_mixed_rays(scene_of(soup, "soup"), 3000, simd_seed), false);
 }
 
 /// All rays go through all of a deep tree: the lists of a stream grow beyond what they may waste.
@@ -332,7 +331,7 @@ TEST(Simd, DeepTreesWithAllRaysEverywhere) {
     }
     const Bvh bvh = build_bvh(mesh, {.max_leaf = 1});
     const WideBvh tree(bvh);
-    std::mt19937_64 random(seed);
+    std::mt19937_64 random(simd_seed);
     const auto unit = [&] { return static_cast<float>(random() >> 40) * 0x1p-24f; };
     std::vector<Ray> rays;
     for (int k = 0; k < 300'000; ++k)  // one class, few of them blocked early
@@ -359,7 +358,7 @@ TEST(Simd, DuplicatedReferences) {
     BvhInternals{bvh}.input_count() = n;
     const WideBvh tree(bvh);
     EXPECT_EQ(tree.stats().references, 2 * n);
-    const auto rays = make_mixed_rays(scene, 20'000, seed);
+    const auto rays = make_mixed_rays(scene, 20'000, simd_seed);
     const Bvh plain = build_bvh(scene.mesh());
     for (const SimdPath path : paths)
         EXPECT_TRUE(
@@ -373,7 +372,7 @@ TEST(Simd, AllHitsLikeScalar) {
     for (const Model& scene : builtin_triangle_scenes(5'000)) {
         const Bvh bvh = build_bvh(scene.mesh());
         const WideBvh tree(bvh);
-        const auto rays = make_mixed_rays(scene, 1000 * thorough, seed);
+        const auto rays = make_mixed_rays(scene, 1000 * thorough, simd_seed);
         const AllHits wanted = trace_all(bvh, rays);
         EXPECT_GT(wanted.hits.size(), 0u);
         for (const std::string& isa : simd_instruction_sets())
@@ -427,7 +426,7 @@ TEST(Simd, OneRayLikeBatches) {
     const Model scene = load_model("builtin:atrium?triangles=10000");
     const Bvh bvh = build_bvh(scene.mesh());
     const WideBvh tree(bvh);
-    const auto rays = make_mixed_rays(scene, 2000, seed);
+    const auto rays = make_mixed_rays(scene, 2000, simd_seed);
     const auto wanted = trace(bvh, rays);
     for (std::size_t i = 0; i < rays.size(); ++i) {
         ASSERT_TRUE(same_bits(closest_hit(tree, rays[i]), wanted[i])) << i;
@@ -444,7 +443,7 @@ TEST(Simd, OneRayLikeBatches) {
 TEST(Simd, OneRayOfACallerThatFlushesDenormals) {
     const Mesh mesh = scaled(random_soup(300, 4, 0.3f), 1e-11f);
     const WideBvh tree(build_bvh(mesh));
-    auto rays = make_mixed_rays(scene_of(mesh, "tiny"), 3000, seed);
+    auto rays = make_mixed_rays(scene_of(mesh, "tiny"), 3000, simd_seed);
     for (Ray& ray : rays) ray.direction = 1e-30f * ray.direction;  // t beyond the usual too
     std::vector<Hit> wanted(rays.size()), hits(rays.size());
     for (std::size_t i = 0; i < rays.size(); ++i) wanted[i] = closest_hit(tree, rays[i]);
@@ -460,7 +459,7 @@ TEST(Simd, OneRayOfACallerThatFlushesDenormals) {
 
 TEST(Simd, SameCountsForEveryThreadCount) {
     const Model scene = load_model("builtin:atrium?triangles=10000");
-    const auto rays = make_mixed_rays(scene, 2000 * thorough, seed);
+    const auto rays = make_mixed_rays(scene, 2000 * thorough, simd_seed);
     const WideBvh tree(build_bvh(scene.mesh()));
     for (const SimdPath path : paths) {
         std::vector<Hit> wanted(rays.size()), hits(rays.size());
@@ -522,7 +521,7 @@ TEST(Simd, EachPathWhereItBelongs) {
 TEST(Simd, EntersFewerNodesThanScalar) {
     const Model scene = load_model("builtin:atrium?triangles=20000");
     const Bvh bvh = build_bvh(scene.mesh());
-    const auto rays = make_mixed_rays(scene, 10'000, seed);
+    const auto rays = make_mixed_rays(scene, 10'000, simd_seed);
     std::vector<Hit> hits(rays.size());
     const TraceCounts binary = trace(bvh, rays, hits, {.counters = true});
     const WideBvh tree(bvh);
@@ -562,7 +561,7 @@ TEST(Simd, NoRayLeavesAClosedSurface) {
     for (const Vec3 move : {Vec3{0, 0, 0}, Vec3{1e5f, 1e5f, -1e5f}}) {
         const Mesh mesh = ball_mesh(move);
         const WideBvh tree(build_bvh(mesh, {.max_leaf = 1}));
-        std::mt19937_64 random(seed);
+        std::mt19937_64 random(simd_seed);
         std::vector<Ray> rays;
         for (std::size_t k = 0; k < 10'000 * thorough; ++k) {
             const Triangle& t = mesh.triangles[random() % mesh.triangles.size()];

@@ -12,12 +12,11 @@
 #include <vector>
 
 #include "layout/wide_bvh.h"
+#include "support/bits.h"
 #include "trace/simd/simd_kernels.h"
 
 namespace raydix::test {
 namespace {
-
-bool same_bits(const Hit& a, const Hit& b) { return std::memcmp(&a, &b, sizeof(Hit)) == 0; }
 
 struct View {
     Bvh bvh;

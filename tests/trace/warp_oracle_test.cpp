@@ -22,7 +22,7 @@
 namespace raydix::test {
 namespace {
 
-constexpr int widths[] = {1, 2, 4, 8, 16, 32, 64, 128};
+constexpr int oracle_widths[] = {1, 2, 4, 8, 16, 32, 64, 128};
 
 struct Vector {
     double x, y, z;
@@ -238,7 +238,7 @@ void expect_hits_of_the_oracle(const Model& scene, Builder builder, std::size_t 
     machine.block_lanes = 64;
     std::vector<SimulateOptions> runs;
     for (const WarpKernel kernel : warp_kernels())
-        for (const int width : widths)
+        for (const int width : oracle_widths)
             for (const bool any_hit : {false, true})
                 if (!any_hit || width == 32)
                     runs.push_back(

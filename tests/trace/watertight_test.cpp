@@ -17,10 +17,10 @@
 namespace raydix {
 namespace {
 
-constexpr std::uint64_t seed = 20120731;
+constexpr std::uint64_t watertight_seed = 20120731;
 
 /// A closed mesh, and points inside it that are far from its surface.
-struct Solid {
+struct ClosedMesh {
     Mesh mesh;
     std::vector<Vec3> inside;
 };
@@ -37,7 +37,7 @@ public:
     }
 
 private:
-    std::mt19937_64 engine_{seed};
+    std::mt19937_64 engine_{watertight_seed};
 };
 
 double longest_edge(const Mesh& mesh) {
@@ -74,9 +74,9 @@ bool is_inside(const Bvh& bvh, Vec3 p) {
 
 /// The figure, a thousand times as large as it comes: 1e5 away, 1000 ulp are 7.8 units, and it must
 /// have room for that.
-const Solid& large_figure() {
-    static const Solid solid = [] {
-        Solid s{load_model("builtin:figure?triangles=20000").mesh(), {}};
+const ClosedMesh& large_figure() {
+    static const ClosedMesh solid = [] {
+        ClosedMesh s{load_model("builtin:figure?triangles=20000").mesh(), {}};
         for (Vec3& v : s.mesh.vertices) v = 1000.0f * v;
         const Bvh bvh = build_bvh(s.mesh);
         const Aabb box = bvh.bounds();
@@ -92,15 +92,15 @@ const Solid& large_figure() {
     return solid;
 }
 
-Solid transformed(float scale, Vec3 move) {
-    Solid solid = large_figure();
+ClosedMesh transformed(float scale, Vec3 move) {
+    ClosedMesh solid = large_figure();
     for (Vec3& v : solid.mesh.vertices) v = scale * v + move;
     for (Vec3& p : solid.inside) p = scale * p + move;
     return solid;
 }
 
 /// One third anywhere, one third at vertices, one third at middles of edges.
-Ray inside_ray(const Solid& solid, Random& random) {
+Ray inside_ray(const ClosedMesh& solid, Random& random) {
     const Vec3 from = solid.inside[random.below(solid.inside.size())];
     const Triangle& t = solid.mesh.triangles[random.below(solid.mesh.triangles.size())];
     const Vec3 a = solid.mesh.vertices[t[0]], b = solid.mesh.vertices[t[1]];
@@ -119,7 +119,7 @@ std::size_t rays_wanted() {
     return given ? std::strtoull(given, nullptr, 10) : test::fewer(500'000 * test::thorough, 10);
 }
 
-void expect_no_leak(const char* name, const Solid& solid) {
+void expect_no_leak(const char* name, const ClosedMesh& solid) {
     ASSERT_GT(solid.inside.size(), 20u) << "too few points inside to start from";
     const Bvh bvh = build_bvh(solid.mesh);
     ASSERT_EQ(bvh.left_out(), 0u);
@@ -133,10 +133,10 @@ void expect_no_leak(const char* name, const Solid& solid) {
             if (hits[i].hit()) continue;
             if (++leaks > 5) continue;
             const Ray& r = rays[i];
-            ADD_FAILURE() << name << ", seed " << seed << ": ray " << rays_done + i << " from ("
-                          << r.origin.x << ", " << r.origin.y << ", " << r.origin.z << ") along ("
-                          << r.direction.x << ", " << r.direction.y << ", " << r.direction.z
-                          << ") slips out";
+            ADD_FAILURE() << name << ", seed " << watertight_seed << ": ray " << rays_done + i
+                          << " from (" << r.origin.x << ", " << r.origin.y << ", " << r.origin.z
+                          << ") along (" << r.direction.x << ", " << r.direction.y << ", "
+                          << r.direction.z << ") slips out";
         }
         rays_done += rays.size();
     }
@@ -170,7 +170,8 @@ int signed_crossings(const Mesh& mesh, const Ray& ray, std::span<const Hit> hits
     return sum;
 }
 
-std::size_t count_wrong_crossings(const Solid& solid, const std::vector<Ray>& rays, int expected) {
+std::size_t count_wrong_crossings(const ClosedMesh& solid, const std::vector<Ray>& rays,
+                                  int expected) {
     const AllHits all = trace_all(build_bvh(solid.mesh), rays);
     std::size_t wrong = 0;
     for (std::size_t i = 0; i < rays.size(); ++i) {
@@ -186,7 +187,7 @@ std::size_t count_wrong_crossings(const Solid& solid, const std::vector<Ray>& ra
 
 TEST(Watertight, CrossingsAreExactThroughEdgesAndVertices) {
     for (const Vec3 move : {Vec3{0, 0, 0}, Vec3{1e5f, 0, -1e5f}}) {
-        const Solid solid = transformed(1.0f, move);
+        const ClosedMesh solid = transformed(1.0f, move);
         Random random;
         std::vector<Ray> from_inside(10000 * test::thorough), from_outside(from_inside.size());
         for (Ray& ray : from_inside) ray = inside_ray(solid, random);

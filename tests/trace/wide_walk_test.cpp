@@ -16,7 +16,7 @@
 namespace raydix::test {
 namespace {
 
-constexpr std::uint64_t seed = 48;
+constexpr std::uint64_t wide_walk_seed = 48;
 
 struct CountedVisits {
     std::uint64_t visits = 0;
@@ -43,7 +43,7 @@ Hit closest(const Bvh& bvh, const WideTree& tree, const Ray& given, WideStack& s
 
 void expect_like_scalar(const Model& scene, const BuildOptions& options) {
     const Bvh bvh = build_bvh(scene.mesh(), options);
-    const auto rays = make_mixed_rays(scene, fewer(2000 * thorough, 4), seed);
+    const auto rays = make_mixed_rays(scene, fewer(2000 * thorough, 4), wide_walk_seed);
     std::vector<Hit> wanted(rays.size());
     const TraceCounts scalar = trace(bvh, rays, wanted, {.counters = true});
     std::uint64_t last = scalar.node_visits;
@@ -56,7 +56,8 @@ void expect_like_scalar(const Model& scene, const BuildOptions& options) {
             const Hit hit = closest(bvh, tree, rays[i], stack, steps);
             different += std::memcmp(&hit, &wanted[i], sizeof(hit)) != 0;
         }
-        EXPECT_EQ(different, 0u) << scene.name << ", width " << width << ", seed " << seed;
+        EXPECT_EQ(different, 0u) << scene.name << ", width " << width << ", seed "
+                                 << wide_walk_seed;
         EXPECT_LT(steps.visits, last) << scene.name << ", width " << width;
         last = steps.visits;
     }

@@ -11,7 +11,7 @@
 namespace raydix::test {
 namespace {
 
-const auto run = [](auto& tree) {
+const auto run_apetrei = [](auto& tree) {
     HostLauncher<> launcher;
     launch_apetrei(launcher, tree.in,
                    tree.template scratch<ApetreiScratch>(tree.in.count, tree.in.max_leaf),
@@ -32,10 +32,10 @@ struct BoxOfRun {
 };
 
 template <class Key>
-void expect_talk() {
+void expect_apetrei_talk() {
     const std::vector<Key> keys = talk_keys<Key>();
     LaunchedTree<Key> tree(keys, 1);
-    run(tree);
+    run_apetrei(tree);
     EXPECT_EQ(tree.ranges(), talk_ranges());
     EXPECT_EQ(tree.max_depth, 4u);
     // Ranks are splits: the root divides behind key 3, (0, 3) behind 1, (4, 7) behind 4.
@@ -45,19 +45,19 @@ void expect_talk() {
 }
 
 TEST(Apetrei, WorkedExample) {
-    expect_talk<std::uint32_t>();
-    expect_talk<std::uint64_t>();
+    expect_apetrei_talk<std::uint32_t>();
+    expect_apetrei_talk<std::uint64_t>();
 }
 
 TEST(Apetrei, RangesAreThoseOfTheRecursion) {
-    expect_reference_ranges<std::uint32_t>(run);
-    expect_reference_ranges<std::uint64_t>(run);
+    expect_reference_ranges<std::uint32_t>(run_apetrei);
+    expect_reference_ranges<std::uint64_t>(run_apetrei);
 }
 
 TEST(Apetrei, OneKey) {
     const std::vector<std::uint32_t> keys{5};
     LaunchedTree<std::uint32_t> tree(keys, 1);
-    run(tree);
+    run_apetrei(tree);
     EXPECT_EQ(tree.inner_count, 0u);
     EXPECT_EQ(tree.max_depth, 0u);
     EXPECT_EQ(tree.nodes[0].count, 1u);

@@ -20,7 +20,7 @@ const auto run_by = [](auto& launcher, auto& tree) {
         tree.template scratch<GaranzhaScratch>(tree.in.count, tree.in.max_leaf, tree.level_limit),
         tree.links(), tree.levels());
 };
-const auto run = [](auto& tree) {
+const auto run_garanzha = [](auto& tree) {
     HostLauncher<> launcher;
     run_by(launcher, tree);
 };
@@ -45,10 +45,10 @@ void expect_ranks_by_level(const LaunchedTree<Key>& tree) {
 }
 
 template <class Key>
-void expect_talk() {
+void expect_garanzha_talk() {
     const std::vector<Key> keys = talk_keys<Key>();
     LaunchedTree<Key> tree(keys, 1);
-    run(tree);
+    run_garanzha(tree);
     EXPECT_EQ(tree.ranges(), talk_ranges());
     const std::vector<std::uint32_t> first_levels(tree.level_count.begin(),
                                                   tree.level_count.begin() + 5);
@@ -58,13 +58,13 @@ void expect_talk() {
 }
 
 TEST(Garanzha, WorkedExample) {
-    expect_talk<std::uint32_t>();
-    expect_talk<std::uint64_t>();
+    expect_garanzha_talk<std::uint32_t>();
+    expect_garanzha_talk<std::uint64_t>();
 }
 
 TEST(Garanzha, RangesAreThoseOfTheRecursion) {
-    expect_reference_ranges<std::uint32_t>(run);
-    expect_reference_ranges<std::uint64_t>(run);
+    expect_reference_ranges<std::uint32_t>(run_garanzha);
+    expect_reference_ranges<std::uint64_t>(run_garanzha);
 }
 
 TEST(Garanzha, RanksOfALevelFollowOneAnother) {
@@ -72,7 +72,7 @@ TEST(Garanzha, RanksOfALevelFollowOneAnother) {
     for (const std::uint32_t max_leaf : {1u, 4u}) {
         const auto keys = random_keys<std::uint64_t>(random, 20'000, 1u << 13);
         LaunchedTree<std::uint64_t> tree(keys, max_leaf);
-        run(tree);
+        run_garanzha(tree);
         expect_ranks_by_level(tree);
     }
 }
@@ -82,7 +82,7 @@ TEST(Garanzha, NumbersFollowTheKeysInEveryOrderOfThreads) {
     for (const std::uint32_t max_leaf : {1u, 4u}) {
         const auto keys = random_keys<std::uint32_t>(random, 1000 * thorough, 1u << 12);
         LaunchedTree<std::uint32_t> expected(keys, max_leaf);
-        run(expected);
+        run_garanzha(expected);
         std::vector<std::uint32_t> first(expected.nodes.size(), 0);  // key of a slot's range
         for (std::uint32_t rank = expected.inner_count; rank-- > 0;) {
             const std::uint32_t pair = pair_slot(rank);
@@ -115,7 +115,7 @@ TEST(Garanzha, TheDeepestTreeStaysWithinItsLevels) {
     std::vector<std::uint32_t> keys(4, 0);
     for (int bit = 0; bit < 30; ++bit) keys.push_back(1u << bit);
     LaunchedTree<std::uint32_t> tree(keys, 1);
-    run(tree);
+    run_garanzha(tree);
     EXPECT_EQ(tree.ranges(), reference_ranges(keys, 1));
     std::uint32_t used = 0;
     while (used < tree.level_limit && tree.level_count[used] != 0) ++used;

@@ -8,17 +8,17 @@
 namespace raydix::test {
 namespace {
 
-const auto run = [](auto& tree) {
+const auto run_karras = [](auto& tree) {
     HostLauncher<> launcher;
     launch_karras(launcher, tree.in, tree.template scratch<KarrasScratch>(tree.in.count),
                   tree.links());
 };
 
 template <class Key>
-void expect_talk() {
+void expect_karras_talk() {
     const std::vector<Key> keys = talk_keys<Key>();
     LaunchedTree<Key> tree(keys, 1);
-    run(tree);
+    run_karras(tree);
     EXPECT_EQ(tree.ranges(), talk_ranges());
     // One leaf a key, so ranks are the radix nodes of the paper: (0, 1) is node 1, (0, 3) is
     // node 3.
@@ -27,13 +27,13 @@ void expect_talk() {
 }
 
 TEST(KarrasLaunches, WorkedExample) {
-    expect_talk<std::uint32_t>();
-    expect_talk<std::uint64_t>();
+    expect_karras_talk<std::uint32_t>();
+    expect_karras_talk<std::uint64_t>();
 }
 
 TEST(KarrasLaunches, RangesAreThoseOfTheRecursion) {
-    expect_reference_ranges<std::uint32_t>(run);
-    expect_reference_ranges<std::uint64_t>(run);
+    expect_reference_ranges<std::uint32_t>(run_karras);
+    expect_reference_ranges<std::uint64_t>(run_karras);
 }
 
 }  // namespace

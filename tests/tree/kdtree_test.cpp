@@ -21,7 +21,7 @@
 namespace raydix::test {
 namespace {
 
-constexpr std::uint64_t seed = 77;
+constexpr std::uint64_t kdtree_seed = 77;
 
 bool same_nodes(std::span<const KdNode> a, std::span<const KdNode> b) {
     return a.size() == b.size() &&
@@ -41,7 +41,7 @@ void compare_all(const std::string& name, const MeshView& mesh) {
                 options.threads = threads;
                 SCOPED_TRACE(name + ", bits " + std::to_string(bits) + ", max_leaf " +
                              std::to_string(max_leaf) + ", threads " + std::to_string(threads) +
-                             ", seed " + std::to_string(seed));
+                             ", seed " + std::to_string(kdtree_seed));
                 KdTree built = build_kdtree(mesh, options);
                 EXPECT_EQ(kd_check(built, mesh).broken, "");
                 ASSERT_EQ(kd_hash(built), hash);
@@ -57,7 +57,7 @@ void compare_all(const std::string& name, const MeshView& mesh) {
 }
 
 TEST(KdTree, PointsLikeTheReference) {
-    for (const PointSet& set : point_sets(120 * thorough, seed))
+    for (const PointSet& set : point_sets(120 * thorough, kdtree_seed))
         compare_all(set.name, MeshView(set.points, {}));
 }
 
@@ -236,7 +236,7 @@ std::vector<KdNode> nodes_by(Launcher& launcher, const Prepared& in, std::uint32
 }
 
 TEST(KdTreePipeline, OrderOfWorkDoesNotMatterAndCountsAreTaken) {
-    const auto sets = point_sets(60 * thorough, seed);
+    const auto sets = point_sets(60 * thorough, kdtree_seed);
     for (const PointSet& set : sets) {
         const Prepared in(set.points, 2);
         if (in.codes.size() <= 2) continue;

@@ -12,12 +12,14 @@
 namespace raydix::test {
 namespace {
 
-constexpr std::uint64_t seed = 9;
+constexpr std::uint64_t octree_check_seed = 9;
 
-Octree sample() { return build_octree(random_soup(300, seed), {.max_level = 6, .max_leaf = 3}); }
+Octree sample() {
+    return build_octree(random_soup(300, octree_check_seed), {.max_level = 6, .max_leaf = 3});
+}
 
 TEST(OctreeCheck, BuiltTreesKeepEveryInvariant) {
-    for (const NamedPoints& input : octree_inputs(500, seed))
+    for (const NamedPoints& input : octree_inputs(500, octree_check_seed))
         for (const int bits : {30, 63})
             for (const int max_level : {-1, 0, 4})
                 for (const int max_leaf : {1, 6}) {
@@ -30,7 +32,7 @@ TEST(OctreeCheck, BuiltTreesKeepEveryInvariant) {
                     EXPECT_EQ(report.nodes, octree.nodes().size());
                     EXPECT_EQ(report.primitives, octree.order().size());
                 }
-    Mesh mesh = random_soup(300, seed);
+    Mesh mesh = random_soup(300, octree_check_seed);
     mesh.vertices[5].y = infinity;
     EXPECT_EQ(check(build_octree(mesh), mesh).broken, "");
 }
@@ -106,7 +108,7 @@ TEST(OctreeCheck, NamesEveryPlantedFault) {
 }
 
 TEST(OctreeCheck, AMeshIsTheOneItWasBuiltFrom) {
-    const Mesh mesh = random_soup(300, seed);
+    const Mesh mesh = random_soup(300, octree_check_seed);
     const Octree octree = build_octree(mesh, {.max_level = 6, .max_leaf = 3});
     EXPECT_EQ(check(octree, mesh).broken, "");
     Mesh other = mesh;
@@ -133,7 +135,7 @@ TEST(OctreeCheck, HashesTellTreesApart) {
     const auto hash = [](std::span<const Vec3> points, const OctreeOptions& options) {
         return tree_hash(build_octree(points, options));
     };
-    std::vector<Vec3> points = octree_inputs(200, seed)[5].points;
+    std::vector<Vec3> points = octree_inputs(200, octree_check_seed)[5].points;
     const OctreeOptions options{.max_level = 6, .max_leaf = 2};
     const std::string first = hash(points, options);
     EXPECT_EQ(first.size(), 32u);
@@ -172,7 +174,7 @@ TEST(OctreeCheck, OptionsAndInputOutOfRange) {
 
 /// A triangle stands at the centre of its box.
 TEST(OctreeCheck, TrianglesStandAtTheCentresOfTheirBoxes) {
-    const Mesh mesh = random_soup(100, seed);
+    const Mesh mesh = random_soup(100, octree_check_seed);
     const Octree octree = build_octree(mesh);
     EXPECT_EQ(octree.kind(), PrimitiveKind::triangles);
     for (std::size_t k = 0; k < octree.order().size(); ++k) {

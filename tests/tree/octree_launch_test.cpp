@@ -12,11 +12,11 @@
 namespace raydix::test {
 namespace {
 
-constexpr std::uint64_t seed = 31;
+constexpr std::uint64_t octree_launch_seed = 31;
 
 template <class Key>
 std::vector<Key> sorted_codes(std::size_t n, Key mask) {
-    std::mt19937_64 random(seed);
+    std::mt19937_64 random(octree_launch_seed);
     std::vector<Key> codes(n);
     for (Key& code : codes) code = static_cast<Key>(random()) & mask;
     std::ranges::sort(codes);

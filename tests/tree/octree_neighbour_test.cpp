@@ -9,7 +9,7 @@
 namespace raydix::test {
 namespace {
 
-constexpr std::uint64_t seed = 5;
+constexpr std::uint64_t octree_neighbour_seed = 5;
 
 struct Cells {
     std::int64_t level, x, y, z;
@@ -43,12 +43,12 @@ std::uint32_t search(const Octree& octree, std::uint32_t node_index, Direction d
 
 TEST(OctreeNeighbour, EqualsASearchOverAllNodes) {
     std::size_t same = 0, coarser = 0, none = 0;
-    for (const NamedPoints& input : octree_inputs(120, seed))
+    for (const NamedPoints& input : octree_inputs(120, octree_neighbour_seed))
         for (const int bits : {30, 63})
             for (const int max_leaf : {1, 5}) {
                 const Octree octree =
                     build_octree(input.points, {.bits = bits, .max_leaf = max_leaf});
-                SCOPED_TRACE(input.name + ", seed " + std::to_string(seed));
+                SCOPED_TRACE(input.name + ", seed " + std::to_string(octree_neighbour_seed));
                 // Long trees are sampled: all nodes against all nodes takes a while.
                 const std::size_t step = 1 + octree.nodes().size() / (thorough > 1 ? 200 : 20);
                 for (std::uint32_t node = 0; node < octree.nodes().size();
@@ -82,7 +82,7 @@ bool holds(const Aabb& box, Vec3 p) {
 /// cube moved by one edge.
 TEST(OctreeNeighbour, LeavesByTheirCubesInSpace) {
     std::vector<Vec3> points{{0, 0, 0}, {16, 16, 16}};
-    std::mt19937_64 random(seed);
+    std::mt19937_64 random(octree_neighbour_seed);
     for (int i = 0; i < 400; ++i)
         points.push_back({static_cast<float>(random() % 16), static_cast<float>(random() % 16),
                           static_cast<float>(random() % 8)});
@@ -114,7 +114,7 @@ TEST(OctreeNeighbour, LeavesByTheirCubesInSpace) {
 }
 
 TEST(OctreeNeighbour, ManyAtOnceAreTheSameAsOneByOne) {
-    const Octree octree = build_octree(octree_inputs(3000, seed)[5].points);
+    const Octree octree = build_octree(octree_inputs(3000, octree_neighbour_seed)[5].points);
     std::vector<std::uint32_t> nodes;
     for (std::uint32_t i = 0; i < octree.nodes().size(); ++i)
         nodes.push_back(static_cast<std::uint32_t>(octree.nodes().size()) - 1 - i);

@@ -20,7 +20,7 @@ namespace {
 
 using Random = std::mt19937_64;
 
-constexpr std::uint64_t seed = 77;
+constexpr std::uint64_t octree_query_seed = 77;
 constexpr float nan = std::numeric_limits<float>::quiet_NaN();
 
 float unit(Random& random) { return static_cast<float>(random() >> 40) * 0x1p-24f; }
@@ -60,7 +60,7 @@ std::vector<Aabb> boxes_of(const Octree& octree) {
 
 /// In and around the root, on faces of nodes, one float beside them, and far outside.
 std::vector<Vec3> places(const Octree& octree, const std::vector<Aabb>& boxes, std::size_t count) {
-    Random r(seed);
+    Random r(octree_query_seed);
     std::vector<Vec3> list(octree.points().begin(), octree.points().end());
     const Aabb root = boxes.empty() ? Aabb{{0, 0, 0}, {1, 1, 1}} : boxes[0];
     const auto within = [&](float lo, float hi) {
@@ -89,13 +89,14 @@ std::vector<Vec3> places(const Octree& octree, const std::vector<Aabb>& boxes, s
 
 template <class Try>
 void for_each_tree(std::size_t size, const Try& attempt) {
-    for (const NamedPoints& input : octree_inputs(size, seed))
+    for (const NamedPoints& input : octree_inputs(size, octree_query_seed))
         for (const int bits : {30, 63})
             for (const int max_leaf : {1, 8})
                 for (const int max_level : {-1, 3}) {
                     SCOPED_TRACE(input.name + ", bits " + std::to_string(bits) + ", max_leaf " +
                                  std::to_string(max_leaf) + ", max_level " +
-                                 std::to_string(max_level) + ", seed " + std::to_string(seed));
+                                 std::to_string(max_level) + ", seed " +
+                                 std::to_string(octree_query_seed));
                     attempt(
                         build_octree(input.points,
                                      {.bits = bits, .max_level = max_level, .max_leaf = max_leaf}));
@@ -192,7 +193,7 @@ std::vector<std::uint32_t> brute_force(const Octree& octree, const Aabb& box) {
 
 /// Between places of the tree: points, faces of cubes and their neighbouring floats, far outside.
 std::vector<Aabb> query_boxes(const Octree& octree, std::size_t count) {
-    Random r(seed + 1);
+    Random r(octree_query_seed + 1);
     const std::vector<Vec3> list = places(octree, boxes_of(octree), 100);
     std::vector<Aabb> boxes{octree.bounds(), {{-3e38f, -3e38f, -3e38f}, {3e38f, 3e38f, 3e38f}}};
     for (std::size_t i = 0; i < count; ++i) {

@@ -14,13 +14,13 @@
 namespace raydix::test {
 namespace {
 
-constexpr std::uint64_t seed = 20120625;
+constexpr std::uint64_t octree_seed = 20120625;
 constexpr std::size_t size = thorough > 1 ? 2000 : 300;
 
 std::string name_of(const std::string& input, const OctreeOptions& o) {
     return input + ", bits " + std::to_string(o.bits) + ", max_level " +
            std::to_string(o.max_level) + ", max_leaf " + std::to_string(o.max_leaf) + ", threads " +
-           std::to_string(o.threads) + ", seed " + std::to_string(seed);
+           std::to_string(o.threads) + ", seed " + std::to_string(octree_seed);
 }
 
 void compare(const NamedPoints& input, OctreeOptions options) {
@@ -38,14 +38,14 @@ void compare(const NamedPoints& input, OctreeOptions options) {
 }
 
 TEST(Octree, EqualsTheTreeOfOneInsertionAfterTheOther) {
-    for (const NamedPoints& input : octree_inputs(size, seed))
+    for (const NamedPoints& input : octree_inputs(size, octree_seed))
         for (const int bits : {30, 63})
             for (const int max_leaf : {1, 2, 4, 64})
                 compare(input, {.bits = bits, .max_leaf = max_leaf});
 }
 
 TEST(Octree, EndsAtEveryLevelItIsAskedTo) {
-    for (const NamedPoints& input : octree_inputs(size / 4, seed + 1))
+    for (const NamedPoints& input : octree_inputs(size / 4, octree_seed + 1))
         for (const int bits : {30, 63})
             for (int max_level = 0; max_level <= bits / 3; max_level += sanitized ? 4 : 1)
                 for (const int max_leaf : {1, 3})
@@ -53,7 +53,7 @@ TEST(Octree, EndsAtEveryLevelItIsAskedTo) {
 }
 
 TEST(Octree, EveryLeafSize) {
-    const auto inputs = octree_inputs(200, seed + 2);
+    const auto inputs = octree_inputs(200, octree_seed + 2);
     for (const NamedPoints& input : inputs)
         for (int max_leaf = 1; max_leaf <= 64; max_leaf += sanitized ? 21 : 1)
             compare(input, {.max_leaf = max_leaf});
@@ -69,7 +69,7 @@ TEST(Octree, MillionsOfEqualPointsAreOneChain) {
 }
 
 TEST(Octree, InsertionOrderDoesNotMatter) {
-    for (const NamedPoints& input : octree_inputs(size, seed + 3)) {
+    for (const NamedPoints& input : octree_inputs(size, octree_seed + 3)) {
         const OctreeOptions options{.max_leaf = 2};
         EXPECT_EQ(difference(build_octree(input.points, options),
                              reference_octree(input.points, options, true)),

@@ -21,7 +21,7 @@
 namespace raydix::test {
 namespace {
 
-constexpr std::uint64_t seed = 20130601;
+constexpr std::uint64_t reinsertion_seed = 20130601;
 using Nodes = std::vector<BvhNode>;
 
 Nodes nodes_of(const Bvh& bvh) { return {bvh.nodes().begin(), bvh.nodes().end()}; }
@@ -95,8 +95,10 @@ ReinsertionOptions all_nodes(int rounds) {
 TEST(InsertionSearch, FindsTheBestOfAllPlaces) {
     int moved = 0;
     for (const std::size_t n : {3, 4, 5, 9, 40}) {
-        SCOPED_TRACE(std::to_string(n) + " triangles, seed " + std::to_string(seed + n));
-        Nodes nodes = nodes_of(build_bvh(random_soup(n, seed + n, 0.5f), {.max_leaf = 1}));
+        SCOPED_TRACE(std::to_string(n) + " triangles, seed " +
+                     std::to_string(reinsertion_seed + n));
+        Nodes nodes =
+            nodes_of(build_bvh(random_soup(n, reinsertion_seed + n, 0.5f), {.max_leaf = 1}));
         std::vector<std::uint32_t> parents = parents_of(nodes);
         const double area = inner_area(nodes), root = half_area({nodes[0].lo, nodes[0].hi});
         InsertionSearch search({nodes.data(), parents.data()}, 1u << 20);
@@ -128,7 +130,8 @@ TEST(InsertionSearch, FindsTheBestOfAllPlaces) {
 }
 
 TEST(InsertionSearch, WhatIsInsertedCanBeTakenBack) {
-    const Nodes before = nodes_of(build_bvh(random_soup(300, seed, 0.2f), {.max_leaf = 1}));
+    const Nodes before =
+        nodes_of(build_bvh(random_soup(300, reinsertion_seed, 0.2f), {.max_leaf = 1}));
     const std::vector<std::uint32_t> parents = parents_of(before);
     int moved = 0;
     for (std::uint32_t from = 2; from < before.size(); ++from) {
@@ -151,7 +154,7 @@ TEST(InsertionSearch, WhatIsInsertedCanBeTakenBack) {
 
 TEST(Reinsertion, KeepsTheLeavesAndNeverGrowsTheArea) {
     ReinsertionScratch scratch;  // of all trees, one after the other
-    for (const BoxInput& input : cluster_inputs(seed))
+    for (const BoxInput& input : cluster_inputs(reinsertion_seed))
         for (const int max_leaf : {1, 4}) {
             const Bvh bvh = build_bvh(input.boxes, {.max_leaf = max_leaf});
             if (bvh.empty()) continue;
@@ -163,7 +166,8 @@ TEST(Reinsertion, KeepsTheLeavesAndNeverGrowsTheArea) {
 }
 
 TEST(Reinsertion, GainsWhereCodesDividedBadly) {
-    const Nodes before = nodes_of(build_bvh(random_soup(3000, seed, 0.3f), {.max_leaf = 1}));
+    const Nodes before =
+        nodes_of(build_bvh(random_soup(3000, reinsertion_seed, 0.3f), {.max_leaf = 1}));
     ReinsertionScratch scratch;
     Nodes once = before, often = before;
     const ReinsertionResult first = reinsert_nodes(once, all_nodes(1), scratch);
@@ -176,7 +180,7 @@ TEST(Reinsertion, GainsWhereCodesDividedBadly) {
 
 TEST(Reinsertion, IsTheSameForEveryNumberOfThreads) {
     const Nodes before =
-        nodes_of(build_bvh(random_soup(fewer(20'000, 4), seed, 0.1f), {.max_leaf = 1}));
+        nodes_of(build_bvh(random_soup(fewer(20'000, 4), reinsertion_seed, 0.1f), {.max_leaf = 1}));
     Nodes one = before;
     with_threads(1, [&] {
         ReinsertionScratch scratch;
@@ -195,7 +199,7 @@ TEST(Reinsertion, IsTheSameForEveryNumberOfThreads) {
 
 /// Leaf i hangs beside all that come after it: as deep as a tree can be.
 Nodes chain(std::size_t leaves) {
-    std::mt19937_64 random(seed);
+    std::mt19937_64 random(reinsertion_seed);
     const auto unit = [&] { return static_cast<float>(random() >> 40) * 0x1p-24f; };
     Nodes nodes(2 * leaves);
     for (std::size_t i = 0; i < leaves; ++i) {
@@ -240,7 +244,7 @@ TEST(Reinsertion, BoxesWithoutAreaStay) {
 /// Areas that are infinite, or not a number, gain nothing that could be compared.
 TEST(Reinsertion, BoxesBeyondAllAreasLeaveATree) {
     constexpr float huge = std::numeric_limits<float>::max();
-    Nodes nodes = nodes_of(build_bvh(random_soup(100, seed), {.max_leaf = 1}));
+    Nodes nodes = nodes_of(build_bvh(random_soup(100, reinsertion_seed), {.max_leaf = 1}));
     for (std::uint32_t slot = 2; slot < nodes.size(); slot += 7)
         if (nodes[slot].is_leaf()) nodes[slot].hi = {huge, huge, huge};
     for (std::uint32_t slot = 3; slot < nodes.size(); slot += 16)
@@ -254,7 +258,7 @@ TEST(Reinsertion, BoxesBeyondAllAreasLeaveATree) {
 }
 
 TEST(TopTree, IsTheNodesOfTheLargestAreas) {
-    const Bvh bvh = build_bvh(random_soup(3000, seed, 0.1f));
+    const Bvh bvh = build_bvh(random_soup(3000, reinsertion_seed, 0.1f));
     const TopOptions whole{.reinsertion = all_nodes(0), .part = 1.0};
     Buffer<BvhNode> nodes(bvh.nodes().size());
     std::copy(bvh.nodes().begin(), bvh.nodes().end(), nodes.data());

@@ -24,7 +24,7 @@
 namespace raydix::test {
 namespace {
 
-constexpr std::uint64_t seed = 20090801;
+constexpr std::uint64_t sah_seed = 20090801;
 
 BuildOptions options_of(Builder builder, int max_leaf = 4, int threads = 0) {
     BuildOptions options;
@@ -37,8 +37,8 @@ BuildOptions options_of(Builder builder, int max_leaf = 4, int threads = 0) {
 /// Long thin triangles along the diagonals of the cube, with small ones between them: boxes of
 /// almost nothing but air.
 Model sticks(std::size_t count) {
-    Mesh mesh = random_soup(count, seed, 0.02f);
-    std::mt19937_64 random(seed);
+    Mesh mesh = random_soup(count, sah_seed, 0.02f);
+    std::mt19937_64 random(sah_seed);
     const auto unit = [&] { return static_cast<float>(random() >> 40) * 0x1p-24f; };
     for (std::size_t i = 0; i < count / 4; ++i) {
         const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
@@ -150,7 +150,7 @@ private:
 };
 
 TEST(Sweep, GivesTheTreeOfTheDefinition) {
-    for (const BoxInput& input : cluster_inputs(seed)) {
+    for (const BoxInput& input : cluster_inputs(sah_seed)) {
         if (input.boxes.size() > 130) continue;
         for (const int max_leaf : {1, 4, 255}) {
             SCOPED_TRACE(input.name + ", max_leaf " + std::to_string(max_leaf));
@@ -181,7 +181,7 @@ protected:
 };
 
 TEST_P(SahTrees, TakeBoxesThatBuildersGetWrong) {
-    for (const BoxInput& input : cluster_inputs(seed))
+    for (const BoxInput& input : cluster_inputs(sah_seed))
         for (const int max_leaf : {1, 4, 255}) {
             SCOPED_TRACE(input.name);
             const Bvh tree = build_bvh(input.boxes, options(max_leaf));
@@ -232,20 +232,20 @@ TEST_P(SahTrees, RebuildingIntoKeptMemoryGivesTheSameTree) {
 TEST_P(SahTrees, HitsAreThoseOfBruteForce) {
     std::vector<Model> scenes = builtin_triangle_scenes(2000);
     scenes.push_back(sticks(2000));
-    scenes.push_back(scene_of(lattice_mesh(500, 6, seed), "lattice"));
+    scenes.push_back(scene_of(lattice_mesh(500, 6, sah_seed), "lattice"));
     scenes.push_back(scene_of(moved(sticks(500).mesh(), {1e5f, -1e5f, 3e4f}), "far"));
     for (const Model& scene : scenes) {
         const Bvh tree = build_bvh(scene.mesh(), options());
         const CheckReport valid = check(tree, scene.mesh());
         ASSERT_TRUE(valid.ok) << scene.name << ": " << valid.broken;
-        const std::vector<Ray> rays = make_mixed_rays(scene, 100 * thorough, seed);
+        const std::vector<Ray> rays = make_mixed_rays(scene, 100 * thorough, sah_seed);
         const std::vector<Hit> hits = trace(tree, rays);
         const std::vector<Hit> expected = trace_brute_force(scene.mesh(), rays);
         std::vector<std::uint8_t> occluded(rays.size());
         trace_any(tree, rays, occluded);
         for (std::size_t i = 0; i < rays.size(); ++i) {
             ASSERT_EQ(std::memcmp(&hits[i], &expected[i], sizeof(Hit)), 0)
-                << scene.name << ", ray " << i << ", seed " << seed;
+                << scene.name << ", ray " << i << ", seed " << sah_seed;
             ASSERT_EQ(occluded[i] != 0, expected[i].hit()) << scene.name << ", ray " << i;
         }
         // A triangle that a ray meets in several leaves is one hit.
@@ -271,7 +271,7 @@ TEST_P(SahTrees, NoRayLeavesAClosedSurface) {
     }
     const Bvh tree = build_bvh(mesh, options()), other = build_bvh(mesh);
     EXPECT_EQ(tree.has_split_primitives(), GetParam() == Builder::sbvh);
-    std::mt19937_64 random(seed);
+    std::mt19937_64 random(sah_seed);
     std::vector<Ray> rays;
     for (std::size_t i = 0; i < 20'000 * thorough; ++i) {
         const Triangle& t = mesh.triangles[random() % mesh.triangles.size()];
@@ -291,7 +291,7 @@ TEST_P(SahTrees, EachPointOfATriangleIsInALeafThatHoldsIt) {
     for (const BvhNode& node : tree.nodes())
         for (std::uint32_t k = 0; k < node.count; ++k)
             boxes[tree.order()[node.first + k]].push_back({node.lo, node.hi});
-    std::mt19937_64 random(seed);
+    std::mt19937_64 random(sah_seed);
     const auto unit = [&] { return static_cast<double>(random() >> 11) * 0x1p-53; };
     std::size_t outside = 0;
     for (int i = 0; i < 100'000; ++i) {
@@ -311,7 +311,7 @@ TEST_P(SahTrees, EachPointOfATriangleIsInALeafThatHoldsIt) {
             return true;
         });
     }
-    EXPECT_EQ(outside, 0u) << "seed " << seed;
+    EXPECT_EQ(outside, 0u) << "seed " << sah_seed;
 }
 
 TEST_P(SahTrees, AreSavedAndLoaded) {
@@ -381,7 +381,7 @@ TEST(SplitTrees, AreBetterThanSweepOverSticks) {
 /// One triangle among many small ones is cut near its end: its two parts are each other's
 /// neighbours, and so large that even a leaf that counted both would cost no more than they do.
 TEST(SplitTrees, ALeafOfTwoPartsHoldsTheirTriangleOnce) {
-    Mesh mesh = random_soup(4000, seed, 0.01f);
+    Mesh mesh = random_soup(4000, sah_seed, 0.01f);
     for (Vec3& v : mesh.vertices) v = {0.3f * v.x - 0.9f, 0.3f * v.y, 0.3f * v.z};
     mesh.vertices[0].x = -1;  // the scene's middle in x is 0
     const auto first = static_cast<std::uint32_t>(mesh.vertices.size());

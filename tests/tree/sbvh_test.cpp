@@ -19,7 +19,7 @@
 namespace raydix::test {
 namespace {
 
-constexpr std::uint64_t seed = 20090804;
+constexpr std::uint64_t sbvh_seed = 20090804;
 
 std::vector<SplitBox> references_of(const Mesh& mesh) {
     std::vector<SplitBox> all;
@@ -65,7 +65,7 @@ double cost_by_clipping(const Mesh& mesh, const std::vector<SplitBox>& reference
 
 TEST(SpatialSplit, IsTheCheapestPlaneByClipping) {
     for (const std::size_t n : {2, 3, 20, 200}) {
-        const Mesh mesh = random_soup(n, seed + n, 0.5f);
+        const Mesh mesh = random_soup(n, sbvh_seed + n, 0.5f);
         const ReferenceCutter cutter((MeshView(mesh)));
         std::vector<SplitBox> references = references_of(mesh);
         // References that are parts already.
@@ -79,7 +79,7 @@ TEST(SpatialSplit, IsTheCheapestPlaneByClipping) {
         const Aabb box = box_of_all(references);
         for (const std::uint32_t bins : {8u, 16u, 128u}) {
             SCOPED_TRACE(std::to_string(n) + " triangles, " + std::to_string(bins) +
-                         " bins, seed " + std::to_string(seed + n));
+                         " bins, seed " + std::to_string(sbvh_seed + n));
             const SpatialSplit found = find_spatial_split(cutter, references, box, bins);
             ASSERT_LT(found.cost, infinity);
             EXPECT_NEAR(cost_by_clipping(mesh, references, found.axis, found.plane) / found.cost,
@@ -98,10 +98,10 @@ TEST(SpatialSplit, IsTheCheapestPlaneByClipping) {
 
 /// Small ones among few large ones: some stand for all, and are not sliced.
 TEST(SpatialSplit, OfManyTrianglesIsNearlyTheCheapest) {
-    Mesh mesh = random_soup(40000, seed, 0.02f);
+    Mesh mesh = random_soup(40000, sbvh_seed, 0.02f);
     for (Vec3& v : mesh.vertices) v.x *= v.x;  // denser at one end
     const std::size_t large = 12;
-    const Mesh sheets = random_soup(large, seed + 1, 1.5f);
+    const Mesh sheets = random_soup(large, sbvh_seed + 1, 1.5f);
     for (const Triangle& t : sheets.triangles) {
         const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
         for (const std::uint32_t v : t) mesh.vertices.push_back(sheets.vertices[v]);
@@ -123,12 +123,12 @@ TEST(SpatialSplit, OfManyTrianglesIsNearlyTheCheapest) {
 }
 
 TEST(SpatialSplit, DoesNotDependOnTheOrderNorOnBlocks) {
-    const Mesh mesh = random_soup(2 * parallel_boxes + 5, seed, 0.02f);
+    const Mesh mesh = random_soup(2 * parallel_boxes + 5, sbvh_seed, 0.02f);
     const ReferenceCutter cutter((MeshView(mesh)));
     std::vector<SplitBox> references = references_of(mesh);
     const Aabb box = box_of_all(references);
     const SpatialSplit found = find_spatial_split(cutter, references, box, 32);
-    std::mt19937_64 random(seed);
+    std::mt19937_64 random(sbvh_seed);
     std::shuffle(references.begin(), references.end(), random);
     const SpatialSplit other = find_spatial_split(cutter, references, box, 32);
     EXPECT_EQ(found.cost, other.cost);
@@ -165,7 +165,7 @@ TEST(SbvhWidths, GiveTheSameTree) {
     eager.least_overlap = 0;
     eager.least_own_overlap = 0;
     for (const SpatialOptions& options : {SpatialOptions{}, eager}) {
-        const Mesh mesh = random_soup(3000, seed, 0.3f);
+        const Mesh mesh = random_soup(3000, sbvh_seed, 0.3f);
         const PlainTree expected = build(mesh, 4, options);
         EXPECT_GT(expected.order.size(), mesh.triangles.size());
         for (const int width : {8, 16}) {
@@ -182,7 +182,7 @@ TEST(SbvhWidths, GiveTheSameTree) {
 }
 
 TEST(SbvhBudget, IsKept) {
-    const Mesh mesh = random_soup(3000, seed, 0.5f);
+    const Mesh mesh = random_soup(3000, sbvh_seed, 0.5f);
     for (const double budget : {0.0, 0.1, 1.0}) {
         SpatialOptions options;
         options.budget = budget;
@@ -207,7 +207,7 @@ TEST(Sbvh, TakesALeafThatCostsAsMuchAsItsSubtree) {
 }
 
 TEST(Sbvh, LargeNodesGiveTheSameTreeOnEachNumberOfThreads) {
-    const Mesh mesh = random_soup(2 * parallel_boxes + 999, seed, 0.02f);
+    const Mesh mesh = random_soup(2 * parallel_boxes + 999, sbvh_seed, 0.02f);
     BuildOptions options;
     options.builder = Builder::sbvh;
     options.threads = 1;
