@@ -405,19 +405,18 @@ private:
         lines_.one_origin = hn::AllTrue(d4, one);
         lines_.kind = kind;
         std::fill_n(lines_.prim, packet_size, no_primitive);
-        fill_packet(
-            tree_.view,
-            [&](std::size_t i) {
-                RayVectors out;
-                for (int a = 0; a < 3; ++a) {
-                    out.place[a] = hn::Load(f16, origin_[a] + i);
-                    out.way[a] = hn::Load(f16, direction_[a] + i);
-                }
-                out.place[3] = hn::Load(f16, tmin_ + i);
-                out.way[3] = hn::Load(f16, tmax_ + i);
-                return out;
-            },
-            static_cast<std::uint32_t>(count), code, packet_, growth_of_doubles);
+        PacketRays rays;
+        for (std::size_t i = 0; i < count; i += lanes16) {
+            RayVectors& out = rays[i / lanes16];
+            for (int a = 0; a < 3; ++a) {
+                out.place[a] = hn::Load(f16, origin_[a] + i);
+                out.way[a] = hn::Load(f16, direction_[a] + i);
+            }
+            out.place[3] = hn::Load(f16, tmin_ + i);
+            out.way[3] = hn::Load(f16, tmax_ + i);
+        }
+        fill_packet(tree_.view, rays, static_cast<std::uint32_t>(count), code, packet_,
+                    growth_of_doubles);
         return true;
     }
 

@@ -40,11 +40,12 @@ public:
         job_.limits.resize(job_.n);
         job_.invalid = 0;
         job_.single_stack.reserve_words(job_.tree->stack_size);
-        if (job_.single)
-            one_by_one();
-        else
+        if constexpr (all) {
             together();
-        if constexpr (all) hits_.put_in_order();
+            hits_.put_in_order();
+        } else {
+            job_.single ? one_by_one() : together();
+        }
     }
 
 private:
@@ -443,12 +444,13 @@ private:
     void walk_packets(const SimdJob& rays, const PartTree& tree, Leaves& leaves,
                       const std::int32_t* index, std::uint32_t count, std::uint32_t code) {
         Packet packet;
+        PacketRays read;
         SimdCounts counts;
         for (std::uint32_t at = 0; at < count; at += packet_size) {
             const std::int32_t* const here = index + at;
-            fill_packet(
-                rays.tree, [&](std::size_t i) { return read_rays(rays.rays, here + i); },
-                std::min<std::uint32_t>(packet_size, count - at), code, packet, tree.growth);
+            const auto size = std::min<std::uint32_t>(packet_size, count - at);
+            read_packet(rays.rays, here, size, read);
+            fill_packet(rays.tree, read, size, code, packet, tree.growth);
             PacketWalk<any ? Wanted::any : Wanted::closest, false, false, Leaves>(
                 rays.tree, packet, here, leaves, rays.packet_stack, counts)
                 .trace();

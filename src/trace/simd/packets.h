@@ -10,6 +10,7 @@
 #include <hwy/cache_control.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <numeric>
 
@@ -38,11 +39,19 @@ inline void largest_pad(const WideView& tree, const float* least, const float* l
         pad[a] = factor * slab_pad * (far[a] + far[kz]) + least_slab_pad + grown;
 }
 
-/// `count` rays of one class; read(i) gives rays i to i + lanes16 - 1, of which those beyond
-/// `count` repeat others.
-template <class Read>
-HWY_INLINE void fill_packet(const WideView& tree, const Read& read, std::uint32_t count,
-                            std::uint32_t code, Packet& p, PadGrowth growth = {}) {
+/// Rays of a packet, a vector of them each; those beyond the packet's count repeat others.
+using PacketRays = std::array<RayVectors, packet_size / lanes16>;
+
+/// Rays index[0, count) of `rays`; `index` is read up to the next multiple of lanes16.
+HWY_INLINE void read_packet(const Ray* rays, const std::int32_t* index, std::uint32_t count,
+                            PacketRays& to) {
+    for (std::size_t i = 0; i < count; i += lanes16) to[i / lanes16] = read_rays(rays, index + i);
+}
+
+/// `count` rays of one class.
+inline HWY_NOINLINE void fill_packet(const WideView& tree, const PacketRays& rays,
+                                     std::uint32_t count, std::uint32_t code, Packet& p,
+                                     PadGrowth growth = {}) {
     using V = V16;
     p.count = count;
     p.kind = ray_class_of(code);
@@ -58,7 +67,7 @@ HWY_INLINE void fill_packet(const WideView& tree, const Read& read, std::uint32_
             hn::Store(hn::Set(f16, -infinity), f16, p.t + i);
             continue;
         }
-        const RayVectors ray = read(i);
+        const RayVectors& ray = rays[i / lanes16];
         for (int a = 0; a < 3; ++a) {
             const V o = hn::Add(ray.place[a], hn::Zero(f16));  // -0 becomes +0
             hn::Store(o, f16, p.origin[a] + i);
@@ -262,7 +271,7 @@ HWY_INLINE void store_packet(const SimdJob& job, const std::int32_t* index, bool
 }
 
 /// The rays of a job in packets.
-template <Wanted query, bool counting, bool compact>
+template <Wanted query>
 class PacketJob {
     static constexpr bool any = wants_any(query), all = query == Wanted::all;
 
@@ -306,7 +315,7 @@ private:
         if (job_.order != nullptr) std::copy_n(job_.order, count, index_);
         // The last ray again, to fill the vector.
         for (std::size_t k = count; k % lanes16 != 0; ++k) index_[k] = index_[count - 1];
-        RayVectors rays[packet_size / lanes16];
+        PacketRays rays;
         std::uint32_t code = 0;
         for (std::size_t i = 0; i < count; i += lanes16) {
             RayVectors& here = rays[i / lanes16];
@@ -316,8 +325,7 @@ private:
             const auto same = hn::Eq(codes, hn::Set(I16(), static_cast<std::int32_t>(code)));
             if (code == odd_ray_class || !hn::AllTrue(I16(), same)) return false;
         }
-        trace_packet([&](std::size_t i) { return rays[i / lanes16]; }, index_,
-                     static_cast<std::uint32_t>(count), code);
+        trace_packet(rays, index_, static_cast<std::uint32_t>(count), code);
         return true;
     }
 
@@ -352,32 +360,43 @@ private:
             const std::int32_t* const rays = sorter.rays(code);
             for (std::uint32_t at = 0; at < sorter.count(code); at += packet_size) {
                 const std::int32_t* const index = rays + at;
-                trace_packet([&](std::size_t i) { return read_rays(job_.rays, index + i); }, index,
-                             std::min<std::uint32_t>(packet_size, sorter.count(code) - at), code);
+                const auto count = std::min<std::uint32_t>(packet_size, sorter.count(code) - at);
+                PacketRays read;
+                read_packet(job_.rays, index, count, read);
+                trace_packet(read, index, count, code);
             }
         }
         const std::int32_t* const odd = sorter.rays(odd_ray_class);
-        for (std::uint32_t k = 0; k < sorter.count(odd_ray_class); ++k)
-            trace_one<query, counting, compact>(job_, static_cast<std::size_t>(odd[k]), counts_);
+        for (std::uint32_t k = 0; k < sorter.count(odd_ray_class); ++k) {
+            const auto i = static_cast<std::size_t>(odd[k]);
+            by_layout(job_.tree,
+                      [&](auto compact) { trace_one<query, true, compact>(job_, i, counts_); });
+        }
         if constexpr (all)
             counts_.hits += group_by_ray(*job_.all, before_, job_.n, job_.hit_counts);
     }
 
-    template <class Read>
-    HWY_INLINE void trace_packet(const Read& read, const std::int32_t* index, std::uint32_t count,
-                                 std::uint32_t code) {
+    HWY_NOINLINE void trace_packet(const PacketRays& rays, const std::int32_t* index,
+                                   std::uint32_t count, std::uint32_t code) {
         if (job_.order == nullptr) {
             // What the next job will read first, while there is something to do.
             for (std::uint32_t k = 0; k < count; k += 2) hwy::Prefetch(ahead_ + k);
             ahead_ += count;
         }
-        fill_packet(job_.tree, read, count, code, packet_);
-        PacketWalk<query, counting, compact> walk(job_.tree, packet_, job_.rays, index,
-                                                  job_.packet_stack, counts_, job_.all, job_.check);
-        walk.trace();
+        fill_packet(job_.tree, rays, count, code, packet_);
+        std::uint64_t found = 0;
+        with_constants(job_, [&](auto counting, auto compact) {
+            // All hits and accepted ones are always counted.
+            constexpr bool counts = counting || all || wants_accepted(query);
+            PacketWalk<query, counts, compact> walk(job_.tree, packet_, job_.rays, index,
+                                                    job_.packet_stack, counts_, job_.all,
+                                                    job_.check);
+            walk.trace();
+            found = walk.found();
+        });
         if constexpr (!all)
             store_packet<query>(job_, index, index == index_ && job_.order == nullptr, packet_,
-                                walk.found(), counts_);
+                                found, counts_);
     }
 
     SimdJob job_;             // what is left of it
@@ -390,15 +409,16 @@ private:
     std::uint32_t later_[max_job_rays];
 };
 
-template <Wanted query, bool counting, bool compact>
+template <Wanted query>
 void trace_packets(const SimdJob& job, SimdCounts& counts) {
-    PacketJob<query, counting, compact>(job, counts).trace();
+    PacketJob<query>(job, counts).trace();
 }
 
 /// Rays index[0, count) of one class as a stream; `index` may be read up to the next multiple of
 /// lanes16.
-HWY_INLINE StreamFrame fill_stream(const SimdJob& job, const std::int32_t* index,
-                                   std::uint32_t count, std::uint32_t code, PadGrowth growth = {}) {
+inline HWY_NOINLINE StreamFrame fill_stream(const SimdJob& job, const std::int32_t* index,
+                                            std::uint32_t count, std::uint32_t code,
+                                            PadGrowth growth = {}) {
     std::vector<StreamRay>& rays = job.memory->rays();
     StreamFrame frame;
     frame.kind = ray_class_of(code);
@@ -447,7 +467,7 @@ HWY_INLINE StreamFrame fill_stream(const SimdJob& job, const std::int32_t* index
     return frame;
 }
 
-template <bool any, bool counting, bool compact>
+template <bool any>
 void trace_streams(const SimdJob& job, SimdCounts& counts) {
     RaySorter sorter;
     sorter.sort(job);
@@ -456,7 +476,9 @@ void trace_streams(const SimdJob& job, SimdCounts& counts) {
         if (count == 0) continue;
         const std::int32_t* index = sorter.rays(code);
         const StreamFrame frame = fill_stream(job, index, count, code);
-        StreamWalk<any, counting, compact>(job.tree, frame, *job.memory, job.stack, counts).trace();
+        by_layout(job.tree, [&](auto compact) {
+            StreamWalk<any, true, compact>(job.tree, frame, *job.memory, job.stack, counts).trace();
+        });
         const StreamHit* found = job.memory->hits().data();
         for (const StreamRay& ray : job.memory->rays()) {
             const bool hit = ray.prim != no_primitive;
@@ -471,29 +493,23 @@ void trace_streams(const SimdJob& job, SimdCounts& counts) {
     }
     const std::int32_t* const odd = sorter.rays(odd_ray_class);
     for (std::uint32_t k = 0; k < sorter.count(odd_ray_class); ++k)
-        trace_one<any ? Wanted::any : Wanted::closest, counting, compact>(
-            job, static_cast<std::size_t>(odd[k]), counts);
+        by_layout(job.tree, [&](auto compact) {
+            trace_one<any ? Wanted::any : Wanted::closest, true, compact>(
+                job, static_cast<std::size_t>(odd[k]), counts);
+        });
 }
 
 inline void streams(const SimdJob& job, SimdCounts& counts) {
-    with_constants(job, [&](auto counting, auto compact) {
-        !job.hits ? trace_streams<true, counting, compact>(job, counts)
-                  : trace_streams<false, counting, compact>(job, counts);
-    });
+    !job.hits ? trace_streams<true>(job, counts) : trace_streams<false>(job, counts);
 }
 
 inline void packets(const SimdJob& job, SimdCounts& counts) {
-    with_constants(job, [&](auto counting, auto compact) {
-        if constexpr (counting) {
-            if (job.all != nullptr) return trace_packets<Wanted::all, true, compact>(job, counts);
-            if (job.check != nullptr)
-                return job.hits
-                           ? trace_packets<Wanted::closest_accepted, true, compact>(job, counts)
-                           : trace_packets<Wanted::any_accepted, true, compact>(job, counts);
-        }
-        job.hits ? trace_packets<Wanted::closest, counting, compact>(job, counts)
-                 : trace_packets<Wanted::any, counting, compact>(job, counts);
-    });
+    if (job.all != nullptr) return trace_packets<Wanted::all>(job, counts);
+    if (job.check != nullptr)
+        return job.hits ? trace_packets<Wanted::closest_accepted>(job, counts)
+                        : trace_packets<Wanted::any_accepted>(job, counts);
+    job.hits ? trace_packets<Wanted::closest>(job, counts)
+             : trace_packets<Wanted::any>(job, counts);
 }
 
 }  // namespace raydix::HWY_NAMESPACE

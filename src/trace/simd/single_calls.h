@@ -96,6 +96,12 @@ void trace_one(const SimdJob& job, std::size_t i, SimdCounts& counts) {
 /// All hits, or accepted ones.
 inline bool wants_more(const SimdJob& job) { return job.all != nullptr || job.check != nullptr; }
 
+/// run(whether the tree is compact, as a constant).
+template <class Run>
+HWY_INLINE auto by_layout(const WideView& tree, const Run& run) {
+    return tree.is_compact ? run(std::true_type()) : run(std::false_type());
+}
+
 /// Calls run(counting, compact) with what the job wants, as constants. Code for compact trees, for
 /// all hits and for accepted ones always counts: there is enough of it as it is.
 template <class Run>

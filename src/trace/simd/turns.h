@@ -95,68 +95,31 @@ HWY_INLINE void take_turns(std::array<Turn, n>& turns) {
     }
 }
 
-template <Wanted query, bool counting, bool compact>
-class RayTurns {
-    static constexpr bool any = wants_any(query), all = query == Wanted::all;
-
+/// The rays of a job, one after the other, their frames made lanes16 at a time.
+class RaysOfJob {
 public:
-    RayTurns(const SimdJob& job, SimdCounts& counts) : job_(job), counts_(counts) {}
+    RaysOfJob(const SimdJob& job, SimdCounts& counts) : job_(job), counts_(counts) {}
 
-    void trace() {
-        std::array<Turn, rays_in_turn> turns{};
-        for (std::size_t k = 0; k < turns.size(); ++k) {
-            turns[k].rays = this;
-            turns[k].ray.emplace(job_.tree, turns[k].frame, job_.stack.from(k * job_.stack_size),
-                                 counts_);
-            if constexpr (all) turns[k].ray->collect(*job_.all);
-        }
-        const std::size_t before = all ? job_.all->size() : 0;
-        take_turns(turns);
-        if constexpr (all) counts_.hits += group_by_ray(*job_.all, before, job_.n, job_.hit_counts);
-    }
-
-private:
-    using One = TurnRay<query, counting, compact>;
-    struct Turn {
-        RayTurns* rays;
-        SingleFrame frame;
-        std::optional<One> ray;
-        std::size_t i;  // of the ray in the job
-
-        static constexpr bool has_parts = false;
-        [[nodiscard]] TurnKind kind() const { return static_cast<TurnKind>(ray->next() >> 31); }
-        HWY_INLINE void ask() const { ray->ask_for_next(); }
-        template <TurnKind kind>
-        HWY_INLINE bool look(std::integral_constant<TurnKind, kind> what) {
-            return ray->look(what);
-        }
-        HWY_INLINE void try_hit() { ray->try_hit(); }
-        HWY_INLINE void keep_hit() { ray->keep_hit(); }
-        template <TurnKind kind>
-        HWY_INLINE bool step(std::integral_constant<TurnKind, kind>) {
-            const bool on = kind == TurnKind::node ? ray->step_node() : ray->step_leaf();
-            return on || rays->finish(*this);
-        }
-        HWY_NOINLINE bool start() { return rays->start(*this); }
-    };
-
-    HWY_INLINE bool start(Turn& turn) {
+    /// The next ray that has something to do, its place in the job and its frame; false if none is
+    /// left. Rays before it are invalid or pass the tree's bounds by: they miss.
+    HWY_NOINLINE bool take(std::size_t& i, SingleFrame& frame) {
         while (at_ < count_ || read_ahead()) {
             const std::size_t k = at_++;
-            turn.i = static_cast<std::size_t>(index_[k]);
-            if (frames_.take(k, turn.frame) ||
-                fill_frame(job_.tree, job_.rays[turn.i], turn.frame)) {
-                turn.ray->stand_for(static_cast<std::uint32_t>(turn.i));
-                if constexpr (wants_accepted(query))
-                    turn.ray->check_by(*job_.check, job_.rays + turn.i);
-                if (turn.ray->begin(turn.frame.tmax)) return true;
-            } else {
-                ++counts_.invalid;
-            }
-            set(turn.i, {});
+            i = static_cast<std::size_t>(index_[k]);
+            if (frames_.take(k, frame) || fill_frame(job_.tree, job_.rays[i], frame)) return true;
+            ++counts_.invalid;
+            set(i, {});
         }
         return false;
     }
+    HWY_INLINE void set(std::size_t i, const TreeHit& hit) const {
+        if (job_.hits)
+            job_.hits.put(i, hit);
+        else if (job_.all == nullptr)
+            job_.occluded[i] = hit.hit() ? 1 : 0;
+    }
+
+private:
     /// Frames of the next lanes16 rays, or of all that are left; false if there are none.
     HWY_INLINE bool read_ahead() {
         waiting_ -= count_;
@@ -197,12 +160,76 @@ private:
     /// In an order of their own rays and hits lie anywhere.
     HWY_INLINE void ask_for_ray(std::size_t i) const {
         hwy::Prefetch(job_.rays + i);
-        if constexpr (any)
-            hwy::Prefetch(job_.occluded + i);
-        else
+        if (job_.hits)
             hwy::Prefetch(job_.hits.at(i));
+        else
+            hwy::Prefetch(job_.occluded + i);
     }
 
+    const SimdJob& job_;
+    SimdCounts& counts_;
+    std::size_t next_ = 0;                          // of the job that has not been taken up
+    std::size_t waiting_ = 0, count_ = 0, at_ = 0;  // of index_: all, in frames_, and begun
+    HWY_ALIGN std::int32_t index_[2 * lanes16];     // of rays in the job
+    SingleFrames frames_{job_.tree};
+};
+
+template <Wanted query, bool counting, bool compact>
+class RayTurns {
+    static constexpr bool all = query == Wanted::all;
+
+public:
+    RayTurns(const SimdJob& job, SimdCounts& counts)
+        : job_(job), counts_(counts), rays_(job, counts) {}
+
+    void trace() {
+        std::array<Turn, rays_in_turn> turns{};
+        for (std::size_t k = 0; k < turns.size(); ++k) {
+            turns[k].rays = this;
+            turns[k].ray.emplace(job_.tree, turns[k].frame, job_.stack.from(k * job_.stack_size),
+                                 counts_);
+            if constexpr (all) turns[k].ray->collect(*job_.all);
+        }
+        const std::size_t before = all ? job_.all->size() : 0;
+        take_turns(turns);
+        if constexpr (all) counts_.hits += group_by_ray(*job_.all, before, job_.n, job_.hit_counts);
+    }
+
+private:
+    using One = TurnRay<query, counting, compact>;
+    struct Turn {
+        RayTurns* rays;
+        SingleFrame frame;
+        std::optional<One> ray;
+        std::size_t i;  // of the ray in the job
+
+        static constexpr bool has_parts = false;
+        [[nodiscard]] TurnKind kind() const { return static_cast<TurnKind>(ray->next() >> 31); }
+        HWY_INLINE void ask() const { ray->ask_for_next(); }
+        template <TurnKind kind>
+        HWY_INLINE bool look(std::integral_constant<TurnKind, kind> what) {
+            return ray->look(what);
+        }
+        HWY_INLINE void try_hit() { ray->try_hit(); }
+        HWY_INLINE void keep_hit() { ray->keep_hit(); }
+        template <TurnKind kind>
+        HWY_INLINE bool step(std::integral_constant<TurnKind, kind>) {
+            const bool on = kind == TurnKind::node ? ray->step_node() : ray->step_leaf();
+            return on || rays->finish(*this);
+        }
+        HWY_NOINLINE bool start() { return rays->start(*this); }
+    };
+
+    HWY_INLINE bool start(Turn& turn) {
+        while (rays_.take(turn.i, turn.frame)) {
+            turn.ray->stand_for(static_cast<std::uint32_t>(turn.i));
+            if constexpr (wants_accepted(query))
+                turn.ray->check_by(*job_.check, job_.rays + turn.i);
+            if (turn.ray->begin(turn.frame.tmax)) return true;
+            rays_.set(turn.i, {});
+        }
+        return false;
+    }
     /// False.
     HWY_INLINE bool finish(Turn& turn) {
         if constexpr (all) return false;
@@ -212,23 +239,16 @@ private:
             ++counts_.hits;
             hit = {best.t * turn.frame.t_scale, best.prim, best.u, best.v};
         }
-        set(turn.i, hit);
-        return false;
-    }
-    HWY_INLINE void set(std::size_t i, const TreeHit& hit) {
-        if constexpr (all) return;
-        if constexpr (any)
-            job_.occluded[i] = hit.hit() ? 1 : 0;
+        if constexpr (wants_any(query))
+            job_.occluded[turn.i] = hit.hit() ? 1 : 0;
         else
-            job_.hits.put(i, hit);
+            job_.hits.put(turn.i, hit);
+        return false;
     }
 
     const SimdJob& job_;
     SimdCounts& counts_;
-    std::size_t next_ = 0;                          // of the job that has not been taken up
-    std::size_t waiting_ = 0, count_ = 0, at_ = 0;  // of index_: all, in frames_, and begun
-    HWY_ALIGN std::int32_t index_[2 * lanes16];     // of rays in the job
-    SingleFrames frames_{job_.tree};
+    RaysOfJob rays_;
 };
 
 inline void single(const SimdJob& job, SimdCounts& counts) {
