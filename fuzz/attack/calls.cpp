@@ -161,6 +161,6 @@ static void attack_calls(Case& c) {
     }
 }
 
-static const Kind kind("calls", attack_calls, 0.2);
+static const Kind calls_kind("calls", attack_calls, 0.2);
 
 }  // namespace raydix::attack

@@ -272,6 +272,6 @@ static void attack_double_shapes(Case& c) {
     }
 }
 
-static const Kind kind("double_shapes", attack_double_shapes, 0.5);
+static const Kind double_shapes_kind("double_shapes", attack_double_shapes, 0.5);
 
 }  // namespace raydix::attack

@@ -65,6 +65,6 @@ static void attack_doubles(Case& c) {
     }
 }
 
-static const Kind kind("doubles", attack_doubles, 1);
+static const Kind doubles_kind("doubles", attack_doubles, 1);
 
 }  // namespace raydix::attack

@@ -74,6 +74,6 @@ void attack_files(Case& c) {
 
 }  // namespace
 
-static const Kind kind("files", attack_files, 0.5);
+static const Kind files_kind("files", attack_files, 0.5);
 
 }  // namespace raydix::attack

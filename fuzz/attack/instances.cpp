@@ -50,7 +50,7 @@ void bring_near_unit_length(WideRayLine& line, double& scale) {
     scale *= by;
 }
 
-struct InFloat {
+struct InstancesFloat {
     static constexpr const char* name = "float";
     using Scene = raydix::Scene;
     using Map = Transform;
@@ -77,7 +77,7 @@ struct InFloat {
         return trace_brute_force(mesh, rays, 1);
     }
 };
-struct InDouble {
+struct InstancesDouble {
     static constexpr const char* name = "double";
     using Scene = SceneD;
     using Map = TransformD;
@@ -308,10 +308,10 @@ static void attack_instances(Case& c) {
         switch (c.random.below(5)) {
             case 0:
             case 1:
-                return InstanceDuel<InFloat>(c).run();
+                return InstanceDuel<InstancesFloat>(c).run();
             case 2:
             case 3:
-                return InstanceDuel<InDouble>(c).run();
+                return InstanceDuel<InstancesDouble>(c).run();
             default:
                 return attack_exact_moves(c);
         }
@@ -320,6 +320,6 @@ static void attack_instances(Case& c) {
         c.compared("instances/refused", 1);
     }
 }
-static const Kind kind("instances", attack_instances, 1);
+static const Kind instances_kind("instances", attack_instances, 1);
 
 }  // namespace raydix::attack

@@ -153,6 +153,6 @@ private:
 
 static void attack_octrees(Case& c) { OctreeDuel(c).run(); }
 
-static const Kind kind("octrees", attack_octrees, 0.5);
+static const Kind octrees_kind("octrees", attack_octrees, 0.5);
 
 }  // namespace raydix::attack

@@ -104,6 +104,6 @@ static void attack_pairs(Case& c) {
         attack_in<InDouble>(c);
 }
 
-static const Kind kind("pairs", attack_pairs, 1);
+static const Kind pairs_kind("pairs", attack_pairs, 1);
 
 }  // namespace raydix::attack

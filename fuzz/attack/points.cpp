@@ -31,7 +31,7 @@ Point point_from(Random& random, Vec3 p) {
 
 /// Contract of all distances: in this order, no contraction.
 template <class Point>
-ScalarIn<Point> squared_distance(const Point& a, const Point& b) {
+ScalarIn<Point> distance_squared(const Point& a, const Point& b) {
     const auto dx = a.x - b.x, dy = a.y - b.y;
     if constexpr (is_flat<Point>) {
         return dx * dx + dy * dy;
@@ -112,7 +112,7 @@ private:
         std::vector<Near<Scalar>> all;
         if (!finite(query)) return all;
         for (std::uint32_t i = 0; i < points_.size(); ++i)
-            if (in_range(points_[i])) all.push_back({squared_distance(query, points_[i]), i});
+            if (in_range(points_[i])) all.push_back({distance_squared(query, points_[i]), i});
         std::sort(all.begin(), all.end());
         return all;
     }
@@ -163,7 +163,7 @@ private:
             case 1: {  // the very distance of two points: the boundary
                 const Point &a = points_[random.below(points_.size())],
                             &b = queries_[random.below(queries_.size())];
-                const Scalar d = std::sqrt(squared_distance(a, b));
+                const Scalar d = std::sqrt(distance_squared(a, b));
                 return std::isfinite(d) ? d : 1;
             }
             case 2:
@@ -252,7 +252,7 @@ private:
             std::vector<Near<Scalar>> wanted;
             for (std::uint32_t j = rows == PairRows::half ? i + 1 : 0; j < points_.size(); ++j) {
                 if (j == i || !in_range(points_[i]) || !in_range(points_[j])) continue;
-                const Scalar d2 = squared_distance(points_[i], points_[j]);
+                const Scalar d2 = distance_squared(points_[i], points_[j]);
                 if (d2 <= radius * radius) wanted.push_back({d2, j});
             }
             expect(matches(lists, i, wanted), "neighbour_lists", i);
@@ -282,6 +282,6 @@ static void attack_points(Case& c) {
     }
 }
 
-static const Kind kind("points", attack_points, 1);
+static const Kind points_kind("points", attack_points, 1);
 
 }  // namespace raydix::attack

@@ -122,7 +122,7 @@ inline Vec3d as_double(Vec3d p) { return p; }
 
 /// As the documentation of the closest point has it.
 template <class Point>
-ScalarIn<Point> squared_distance(const Point& a, const Point& b) {
+ScalarIn<Point> documented_d2(const Point& a, const Point& b) {
     const auto dx = a.x - b.x, dy = a.y - b.y, dz = a.z - b.z;
     return (dx * dx + dy * dy) + dz * dz;
 }

@@ -340,6 +340,6 @@ static void attack_rays(Case& c) {
     duel.compare(trees, way, Mode::any);
 }
 
-static const Kind kind("rays", attack_rays, 6);
+static const Kind rays_kind("rays", attack_rays, 6);
 
 }  // namespace raydix::attack

@@ -89,6 +89,6 @@ static void attack_refit(Case& c) {
     }
 }
 
-static const Kind kind("refit", attack_refit, 1);
+static const Kind refit_kind("refit", attack_refit, 1);
 
 }  // namespace raydix::attack

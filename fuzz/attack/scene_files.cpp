@@ -224,17 +224,17 @@ std::uint64_t references_of(const Scene& scene) {
 }
 
 /// All that can be asked of a scene.
-struct Answers {
+struct SceneAnswers {
     std::vector<Hit> closest;
     std::vector<std::uint8_t> any;
     AllHits all;
 };
 
-Answers answers_of(const Scene& scene, std::span<const Ray> rays,
-                   std::span<const std::uint32_t> masks) {
+SceneAnswers answers_of(const Scene& scene, std::span<const Ray> rays,
+                        std::span<const std::uint32_t> masks) {
     const SceneTraceOptions options{.masks = masks, .threads = 1};
-    Answers out{trace(scene, rays, options), std::vector<std::uint8_t>(rays.size()),
-                trace_all(scene, rays, options)};
+    SceneAnswers out{trace(scene, rays, options), std::vector<std::uint8_t>(rays.size()),
+                     trace_all(scene, rays, options)};
     trace_any(scene, rays, out.any, options);
     return out;
 }
@@ -253,7 +253,8 @@ public:
     /// The same answers from both, and what `scene` says of its hits agrees with itself.
     void compare(const Scene& scene, const Scene& wanted, std::span<const Ray> rays) {
         const std::vector<std::uint32_t> masks = any_masks(case_.random, rays.size());
-        const Answers got = answers_of(scene, rays, masks), right = answers_of(wanted, rays, masks);
+        const SceneAnswers got = answers_of(scene, rays, masks),
+                           right = answers_of(wanted, rays, masks);
         expect(same_bytes(got.closest, right.closest), "closest hits");
         expect(same_bytes(got.any, right.any), "any hits");
         expect(got.all.offsets == right.all.offsets && same_bytes(got.all.hits, right.all.hits),
@@ -271,7 +272,7 @@ public:
     /// A scene whose trees hold parts of triangles: a stranger's file may have hidden some of them
     /// from rays, and no more than that.
     void bear(const Scene& scene, std::span<const Ray> rays) {
-        const Answers got = answers_of(scene, rays, any_masks(case_.random, rays.size()));
+        const SceneAnswers got = answers_of(scene, rays, any_masks(case_.random, rays.size()));
         expect_places(scene, got.closest);
         expect_places(scene, got.all.hits);
     }

@@ -341,6 +341,6 @@ static void attack_scene_queries(Case& c) {
         SceneDuel<InDouble>(c).run();
 }
 
-static const Kind kind("scene_queries", attack_scene_queries, 1);
+static const Kind scene_queries_kind("scene_queries", attack_scene_queries, 1);
 
 }  // namespace raydix::attack

@@ -82,6 +82,6 @@ static void attack_simulator(Case& c) {
         compare_pictures(c, made);
 }
 
-static const Kind kind("simulator", attack_simulator, 0.5);
+static const Kind simulator_kind("simulator", attack_simulator, 0.5);
 
 }  // namespace raydix::attack

@@ -215,6 +215,6 @@ static void attack_solids(Case& c) {
     }
 }
 
-static const Kind kind("solids", attack_solids, 1);
+static const Kind solids_kind("solids", attack_solids, 1);
 
 }  // namespace raydix::attack

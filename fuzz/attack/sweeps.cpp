@@ -120,6 +120,6 @@ static void attack_sweeps(Case& c) {
         SweepDuel<InDouble>(c).run();
 }
 
-static const Kind kind("sweeps", attack_sweeps, 1);
+static const Kind sweeps_kind("sweeps", attack_sweeps, 1);
 
 }  // namespace raydix::attack

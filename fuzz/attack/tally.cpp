@@ -7,7 +7,7 @@
 namespace raydix::attack {
 namespace {
 
-std::string quoted(std::string_view text) {
+std::string json_text(std::string_view text) {
     std::string made = "\"";
     for (const char c : text) {
         if (c == '"' || c == '\\') {
@@ -27,7 +27,7 @@ void write_counts(std::FILE* out, const char* name,
     std::fprintf(out, "  \"%s\": {", name);
     const char* before = "\n";
     for (const auto& [key, value] : counts) {
-        std::fprintf(out, "%s    %s: %llu", before, quoted(key).c_str(),
+        std::fprintf(out, "%s    %s: %llu", before, json_text(key).c_str(),
                      static_cast<unsigned long long>(value));
         before = ",\n";
     }
@@ -99,10 +99,10 @@ bool Tally::write_json(const std::string& file, std::uint64_t seed, double secon
         std::fprintf(out,
                      "%s    {\"kind\": %s, \"what\": %s, \"seed\": %llu, \"case\": %llu, "
                      "\"reproducer\": %s}",
-                     before, quoted(finding.kind).c_str(), quoted(finding.what).c_str(),
+                     before, json_text(finding.kind).c_str(), json_text(finding.what).c_str(),
                      static_cast<unsigned long long>(finding.seed),
                      static_cast<unsigned long long>(finding.index),
-                     quoted(finding.reproducer).c_str());
+                     json_text(finding.reproducer).c_str());
         before = ",\n";
     }
     std::fprintf(out, "\n  ]\n}\n");

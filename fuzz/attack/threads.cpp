@@ -113,6 +113,6 @@ static void attack_threads(Case& c) {
                 "    " + text_of(shared.build) + "\n");
 }
 
-static const Kind kind("threads", attack_threads, 0.3);
+static const Kind threads_kind("threads", attack_threads, 0.3);
 
 }  // namespace raydix::attack

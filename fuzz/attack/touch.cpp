@@ -84,7 +84,7 @@ private:
             for (std::size_t q = 0; q < spheres.size(); ++q) {
                 const auto radius = spheres[q].radius;
                 if (alone[q].found() && radius >= 0 && std::isfinite(radius) &&
-                    squared_distance(centers[q], alone[q].position) <= radius * radius)
+                    documented_d2(centers[q], alone[q].position) <= radius * radius)
                     lists[q].push_back(triangle);
             }
         });
@@ -143,6 +143,6 @@ static void attack_touch(Case& c) {
         TouchDuel<InDouble>(c).run();
 }
 
-static const Kind kind("touch", attack_touch, 1);
+static const Kind touch_kind("touch", attack_touch, 1);
 
 }  // namespace raydix::attack

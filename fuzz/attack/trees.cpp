@@ -149,6 +149,6 @@ private:
 
 static void attack_trees(Case& c) { TreeDuel(c).run(); }
 
-static const Kind kind("trees", attack_trees, 1);
+static const Kind trees_kind("trees", attack_trees, 1);
 
 }  // namespace raydix::attack

@@ -231,6 +231,6 @@ static void attack_user_geometry(Case& c) {
         attack_in<InDouble>(c);
 }
 
-static const Kind kind("user_geometry", attack_user_geometry, 1);
+static const Kind user_geometry_kind("user_geometry", attack_user_geometry, 1);
 
 }  // namespace raydix::attack

@@ -95,6 +95,6 @@ static void attack_watertight(Case& c) {
     }
 }
 
-static const Kind kind("watertight", attack_watertight, 1);
+static const Kind watertight_kind("watertight", attack_watertight, 1);
 
 }  // namespace raydix::attack
