@@ -1,10 +1,22 @@
 # Sources whose headers cost more than their own code are compiled several at a time: as one file that includes them.
 # Hot loops are compiled alone, so that what the optimiser allows itself in a file is spent on them.
-option(RAYDIX_UNITY "Compile sources of programs and documents several at a time: a full build is faster" ON)
+option(RAYDIX_UNITY "Compile sources of programs, documents and tests several at a time: a full build is faster" ON)
 
 # All sources of a target, `batch` at a time.
 function(raydix_unity target batch)
     set_target_properties(${target} PROPERTIES UNITY_BUILD ${RAYDIX_UNITY} UNITY_BUILD_BATCH_SIZE ${batch})
+endfunction()
+
+# Sources of a target, `batch` at a time, those that are left out (RAYDIX_SKIP) among them: the others stay with whom they
+# are with in every preset, and names of one file meet those of the same files.
+function(raydix_unity_in_order target batch)
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ${RAYDIX_UNITY} UNITY_BUILD_MODE GROUP)
+    set(count 0)
+    foreach(source ${ARGN})
+        math(EXPR group "${count} / ${batch}")
+        set_source_files_properties(${source} PROPERTIES UNITY_GROUP ${group})
+        math(EXPR count "${count} + 1")
+    endforeach()
 endfunction()
 
 # Those of raydix_sources that the regular expression finds, as one.

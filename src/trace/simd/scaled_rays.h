@@ -22,8 +22,11 @@ inline float longest_of(const Ray& ray) {
                   std::fabs(ray.direction.z));
 }
 
+inline constexpr float nearly_unit_from = 0x1p-3f, nearly_unit_to = 0x1p3f;
 /// Whether kernels take it as it is.
-inline bool is_near_unit(float longest) { return longest > 0x1p-3f && longest < 0x1p3f; }
+inline bool is_near_unit(float longest) {
+    return longest > nearly_unit_from && longest < nearly_unit_to;
+}
 
 /// t of the ray is this times t of `copy`, whose frame is that of the ray. 1 and the ray itself
 /// where kernels take it as it is, where it is invalid, or where no scale does.
@@ -43,15 +46,15 @@ inline float scaled_copy(const Ray& ray, Ray& copy) {
 /// The rays of a job as copies, and where their answers go first. Kept from job to job.
 class ScaledJob {
 public:
-    /// The same job on copies.
-    SimdJob copied(const SimdJob& job) {
-        rays_.resize(job.n);
-        scales_.resize(job.n);
-        for (std::size_t k = 0; k < job.n; ++k)
-            scales_[k] = scaled_copy(job.rays[place(job, k)], rays_[k]);
+    /// The same job on copies, made by `scale`.
+    SimdJob copied(const SimdJob& job, ScaleRays* scale) {
+        rays_.resize(job.n + spare_scaled_rays);
+        scales_.resize(job.n + spare_scaled_rays);
+        scale(job.rays, job.order, job.n, rays_.data(), scales_.data());
         SimdJob out = job;
         out.rays = rays_.data();
         out.order = nullptr;
+        if (job.order == nullptr) return out;  // answers have the places of the copies
         if (job.hits) {
             hits_.resize(job.n);
             out.hits = HitRows(hits_.data());
@@ -63,22 +66,21 @@ public:
     }
     /// What the copies gave, to where the job wants it.
     void hand_over(const SimdJob& job) const {
-        for (std::size_t k = 0; k < job.n; ++k) {
-            if (!job.hits) {
-                job.occluded[place(job, k)] = found_[k];
-                continue;
+        if (job.hits) {
+            for (std::size_t k = 0; k < job.n; ++k) {
+                TreeHit hit = job.order == nullptr ? *job.hits.at(k) : hits_[k];
+                if (hit.hit()) hit.t *= scales_[k];
+                if (job.order == nullptr)
+                    job.hits.at(k)->t = hit.t;
+                else
+                    job.hits.put(job.order[k], hit);
             }
-            TreeHit hit = hits_[k];
-            if (hit.hit()) hit.t *= scales_[k];
-            job.hits.put(place(job, k), hit);
+        } else if (job.order != nullptr) {
+            for (std::size_t k = 0; k < job.n; ++k) job.occluded[job.order[k]] = found_[k];
         }
     }
 
 private:
-    static std::size_t place(const SimdJob& job, std::size_t k) {
-        return job.order == nullptr ? k : job.order[k];
-    }
-
     std::vector<Ray> rays_;
     std::vector<float> scales_;
     std::vector<TreeHit> hits_;

@@ -17,6 +17,7 @@
 #include "base/baseline_isa.h"
 #include "trace/simd/packet.h"
 #include "trace/simd/packets.h"
+#include "trace/simd/scale_rays.h"
 #include "trace/simd/single_calls.h"
 #include "trace/simd/turns.h"
 
@@ -24,7 +25,7 @@ HWY_BEFORE_NAMESPACE();
 namespace raydix::HWY_NAMESPACE {
 
 SimdKernels kernels(std::string_view isa) {
-    return {isa, one<false>, one<true>, single, packets, streams};
+    return {isa, one<false>, one<true>, single, packets, streams, scale_rays};
 }
 
 }  // namespace raydix::HWY_NAMESPACE

@@ -87,6 +87,12 @@ struct SimdJob {
 using OneRay = TreeHit(const WideView& tree, const Ray& ray, const WideStackView& stack,
                        CallHistory& history);
 
+/// Copies have room for so many rays more than they have.
+inline constexpr std::size_t spare_scaled_rays = 16;
+/// scaled_copy (scaled_rays.h) of n rays, rays[order[k]] or rays[k] without an order.
+using ScaleRays = void(const Ray* rays, const std::uint32_t* order, std::size_t n, Ray* copies,
+                       float* scales);
+
 struct SimdKernels {
     std::string_view isa;
     /// One ray; for any hit only the primitive has a meaning.
@@ -95,6 +101,7 @@ struct SimdKernels {
     void (*single)(const SimdJob& job, SimdCounts& counts);
     void (*packets)(const SimdJob& job, SimdCounts& counts);
     void (*streams)(const SimdJob& job, SimdCounts& counts);
+    ScaleRays* scale;
 };
 
 /// Best first; those this processor can run.

@@ -202,7 +202,7 @@ struct Batch {
         if (way == PathWay::alone) {
             run_alone(job, counts);
         } else if (scaled && all == nullptr && check == nullptr) {
-            job_of(kernels, way)(own->scaled.copied(job), counts);
+            job_of(kernels, way)(own->scaled.copied(job, kernels.scale), counts);
             own->scaled.hand_over(job);
         } else {
             job_of(kernels, way)(job, counts);
