@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "base/plain_scale.h"
 #include "engine/hit_order.h"
 #include "engine/scene_job.h"
 #include "engine/shape_leaves.h"
@@ -65,6 +66,7 @@ HWY_INLINE bool near_unit_length(V4 way) {
 /// As direction_scale. As large a one as brings a direction that floats hold near unit length:
 /// distances and short components are then in the range of floats wherever the caller's are.
 inline double line_scale(double longest) {
+    if (is_plainly_scaled(longest) && !near_unit_length(longest)) return plain_scale(longest);
     return longest >= 0x1p125 && longest < 0x1p128 ? 0x1p-125 : direction_scale(longest);
 }
 

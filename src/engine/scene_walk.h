@@ -337,6 +337,13 @@ private:
         if (sees(job_.limits[id].mask, place.scene, placed))
             add(line_of(place, from, ray), id, place.scene, placed, to);
     }
+    /// Of a direction that the caller's, a power of two times it, has: whether each component is
+    /// all that the caller's is.
+    static HWY_INLINE bool keeps_digits(Vec3 scaled) {
+        constexpr float least = std::numeric_limits<float>::min();
+        return std::fabs(scaled.x) >= least && std::fabs(scaled.y) >= least &&
+               std::fabs(scaled.z) >= least;
+    }
     /// At most lanes16 of them.
     HWY_INLINE void add_vector(const Place& place, const PlacedScene& placed,
                                const std::uint32_t* rays, std::uint32_t count, SceneLevel& to) {
@@ -347,7 +354,8 @@ private:
             index[l] = static_cast<std::int32_t>(rays[std::min(l, count - 1)]);
         for (std::uint32_t l = 0; l < count; ++l) {
             const SceneRaySource& source = from.sources[rays[l]];
-            as_they_are = as_they_are && source.scale == 1.0;
+            as_they_are =
+                as_they_are && (source.scale == 1.0 || keeps_digits(from.rays[rays[l]].direction));
             to.sources[to.count + l] = source;
         }
         RayVectors vectors = read_rays(from.rays.data(), index);

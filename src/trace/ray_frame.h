@@ -71,10 +71,6 @@ RAYDIX_HD inline Scalar direction_scale(Scalar longest) {
     return std::ldexp(Scalar(1), -limited);
 }
 
-/// Directions of at least and at most this length are scaled by a power of two that is an ordinary
-/// float, as its inverse is.
-inline constexpr float plainly_scaled_from = 0x1p-100f, plainly_scaled_to = 0x1p100f;
-
 /// The start of a ray in units of `scale`, at least 0. One above 0 stays so: t = 0 is before it,
 /// also where the quotient is less than what the type has.
 template <class Scalar, class Scale>

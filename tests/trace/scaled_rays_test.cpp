@@ -8,8 +8,10 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <numeric>
 #include <vector>
 
+#include "base/plain_scale.h"
 #include "support/random.h"
 #include "support/sanitized.h"
 #include "support/support.h"
@@ -63,6 +65,42 @@ std::vector<Ray> any_rays(Random& random, std::size_t count, std::uint32_t odd) 
 std::vector<Ray> along_a_curve(std::vector<Ray> rays) {
     std::ranges::sort(rays, {}, [](const Ray& ray) { return ray.origin.x; });
     return rays;
+}
+
+TEST(ScaledRays, PowersOfTwoFromBitsAreThoseOfDirectionScale) {
+    Random random(3);
+    const auto expect = [](auto length) {
+        const bool near_unit = length > 0x1p-3f && length < 0x1p3f;
+        if (near_unit || !is_plainly_scaled(length)) return;
+        EXPECT_EQ(plain_scale(length), direction_scale(length)) << length;
+    };
+    for (int exponent = -100; exponent <= 100; ++exponent) {
+        const double power = std::ldexp(1.0, exponent);
+        expect(power), expect(static_cast<float>(power));
+        expect(std::nextafter(power, 0.0)), expect(std::nextafterf(static_cast<float>(power), 0));
+        const float between = static_cast<float>(power) * random.between(1, 2);
+        expect(between), expect(double{between});
+    }
+}
+
+TEST(ScaledRays, VectorsOfCopiesAreTheCopies) {
+    Random random(9);
+    const std::vector<Ray> rays = any_rays(random, 5000, 1);
+    std::vector<std::uint32_t> order(rays.size());
+    std::iota(order.rbegin(), order.rend(), 0u);
+    for (const SimdKernels& kernels : simd_kernels())
+        for (const std::uint32_t* const by : {static_cast<std::uint32_t*>(nullptr), order.data()})
+            for (const std::size_t n : {std::size_t{1}, std::size_t{15}, rays.size()}) {
+                std::vector<Ray> copies(n + spare_scaled_rays);
+                std::vector<float> scales(n + spare_scaled_rays);
+                kernels.scale(rays.data(), by, n, copies.data(), scales.data());
+                for (std::size_t k = 0; k < n; ++k) {
+                    Ray copy;
+                    const float scale = scaled_copy(rays[by == nullptr ? k : by[k]], copy);
+                    ASSERT_EQ(scales[k], scale) << kernels.isa << " " << k;
+                    ASSERT_EQ(std::memcmp(&copies[k], &copy, sizeof(Ray)), 0) << k;
+                }
+            }
 }
 
 TEST(ScaledRays, CopiesHaveTheFrameOfTheRay) {

@@ -13,6 +13,7 @@
 #include <bit>
 #include <limits>
 
+#include "base/plain_scale.h"
 #include "trace/simd/ray_vectors.h"
 #include "trace/simd/scaled_rays.h"
 

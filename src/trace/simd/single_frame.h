@@ -10,7 +10,9 @@
 #include <hwy/highway.h>
 
 #include <bit>
+#include <limits>
 
+#include "base/plain_scale.h"
 #include "trace/simd/lanes.h"
 #include "trace/simd/ray_classes.h"
 #include "trace/simd/stream_rays.h"
@@ -163,15 +165,13 @@ HWY_INLINE void fill_usual_frame(const WideView& tree, V4 place, V4 way, const f
 /// A valid ray with a direction of any length that is plainly scaled. `longest` of its components.
 inline HWY_NOINLINE void fill_scaled_frame(const WideView& tree, const Ray& ray, V4 place, V4 way,
                                            float longest, SingleFrame& out) {
-    const std::uint32_t power = std::bit_cast<std::uint32_t>(longest) & 0x7F800000u;
-    const auto length = std::bit_cast<float>(power);
-    const auto scale = std::bit_cast<float>((254u << 23) - power);
+    const float scale = plain_scale(longest);
     alignas(16) float components[4];
     const V4 scaled = hn::Mul(way, hn::Set(f4, scale));
     hn::Store(scaled, f4, components);
-    constexpr float most = std::numeric_limits<float>::max();
     fill_usual_frame(tree, place, scaled, components, longest * scale,
-                     start_in_units(ray.tmin, scale), min_of(ray.tmax, most) * length, out);
+                     start_in_units(ray.tmin, scale),
+                     min_of(ray.tmax, std::numeric_limits<float>::max()) / scale, out);
     out.t_scale = scale;
 }
 
@@ -188,7 +188,7 @@ HWY_INLINE bool fill_frame(const WideView& tree, const Ray& ray, SingleFrame& ou
                        ray.tmin <= ray.tmax && ray.tmax >= 0.0f;
     if (!usual) {
         if (!is_valid(ray)) return false;
-        if (longest >= plainly_scaled_from && longest <= plainly_scaled_to)
+        if (is_plainly_scaled(longest))
             fill_scaled_frame(tree, ray, place, way, longest, out);
         else
             fill_odd_frame(tree, ray, out);
