@@ -92,7 +92,10 @@ struct Plan {
           streams(can_stream),
           counted(options.counters),
           few(rays.size() < 32) {
-        if (automatic) look = look_at(tree.arrays().bounds, rays);
+        if (automatic)
+            look = look_at(tree.arrays().bounds, rays);
+        else if (look.path != SimdPath::single && !counted)
+            look.scaled = look_at(tree.arrays().bounds, rays).scaled;
         // Rays together share one pad.
         if (automatic && tree.arrays().local_pads) look.path = SimdPath::single;
         look.kind.any = any;
