@@ -15,6 +15,7 @@
 #include <limits>
 #include <vector>
 
+#include "base/plain_scale.h"
 #include "engine/scene_job_double.h"
 #include "engine/triangle_leaves_double.h"
 #include "trace/simd/packets.h"
@@ -286,7 +287,7 @@ private:
         const Vec3d d = ray.direction;
         const double ax = std::fabs(d.x), ay = std::fabs(d.y), az = std::fabs(d.z);
         const double longest = max_of(max_of(ax, ay), az);
-        if (!is_valid(ray) || !(longest > 0x1p-3 && longest < 0x1p3)) return odd_ray_class;
+        if (!is_valid(ray) || !is_plainly_scaled(longest)) return odd_ray_class;
         const Vec3d o = tree_.space.local(ray.origin);
         const auto far = [&](double at, int a) {
             return max_of(std::fabs(tree_.lo[a] - at), std::fabs(tree_.hi[a] - at));
@@ -364,16 +365,31 @@ private:
                                a < kz ? hn::Le(size_of[a], longest) : hn::Lt(size_of[a], longest));
             }
             const V tmin = place[3], tmax = way[3];
-            same = hn::And(same, hn::And(hn::Gt(longest, hn::Set(d4, 0x1p-3)),
-                                         hn::Lt(longest, hn::Set(d4, 0x1p3))));
+            same = hn::And(same, hn::And(hn::Ge(longest, hn::Set(d4, plainly_scaled_from)),
+                                         hn::Le(longest, hn::Set(d4, plainly_scaled_to))));
             same = hn::And(same, hn::And(hn::Le(tmin, tmax), hn::Ge(tmax, zero)));
+            // As make_frame scales them: directions by a power of two, distances by its inverse.
+            const auto near_unit =
+                hn::And(hn::Gt(longest, hn::Set(d4, 0x1p-3)), hn::Lt(longest, hn::Set(d4, 0x1p3)));
+            const auto power =
+                hn::And(hn::BitCast(I(), longest), hn::Set(I(), std::int64_t{0x7FF} << 52));
+            const V one_each = hn::Set(d4, 1.0),
+                    length = hn::IfThenElse(near_unit, one_each, hn::BitCast(d4, power)),
+                    scaled_by = hn::IfThenElse(
+                        near_unit, one_each,
+                        hn::BitCast(d4, hn::Sub(hn::Set(I(), std::int64_t{2046} << 52), power)));
+            hn::Store(scaled_by, d4, scale_ + i);
+            for (int a = 0; a < 3; ++a) way[a] = hn::Mul(way[a], scaled_by);
             same = hn::And(same, hn::Le(far, hn::Mul(hn::Set(d4, farthest_of_packet), size)));
             const V dz = way[kz];
             hn::Store(dz, d4, lines_.way + i);
             hn::Store(hn::Div(hn::Set(d4, 1.0), dz), d4, lines_.per_depth + i);
             hn::Store(hn::Div(way[kind.kx], dz), d4, lines_.shear[0] + i);
             hn::Store(hn::Div(way[kind.ky], dz), d4, lines_.shear[1] + i);
-            const V begin = hn::IfThenElseZero(hn::Gt(tmin, zero), tmin), end = hn::Min(tmax, most);
+            const V least = hn::Set(d4, std::numeric_limits<double>::denorm_min());
+            const V begin = hn::IfThenElseZero(hn::Gt(tmin, zero),
+                                               hn::Max(hn::Mul(tmin, length), least)),
+                    end = hn::Min(hn::Mul(hn::Min(tmax, most), length), most);
             hn::Store(begin, d4, lines_.tmin + i);
             hn::Store(end, d4, lines_.t + i);
             // As find_place.
@@ -433,9 +449,9 @@ private:
                 if ((found >> k & 1) != 0) hit.prim = 0;
             } else if (lines_.prim[k] != no_primitive) {
                 const double area = lines_.area[k];
-                hit = HitD{
-                    TreeHitD{lines_.t[k], lines_.prim[k], lines_.u[k] / area, lines_.v[k] / area},
-                    no_primitive, 0};
+                hit = HitD{TreeHitD{lines_.t[k] * scale_[k], lines_.prim[k], lines_.u[k] / area,
+                                    lines_.v[k] / area},
+                           no_primitive, 0};
                 mesh_.name(hit);
             }
             job_.set(static_cast<std::size_t>(index[k]), hit);
@@ -447,6 +463,7 @@ private:
     const WideTreeD& tree_;
     PacketLinesD lines_;
     Packet packet_;
+    HWY_ALIGN double scale_[packet_size];  // t of the caller's ray is this times t here
     // The float rays of boxes.
     HWY_ALIGN float origin_[3][packet_size], direction_[3][packet_size];
     HWY_ALIGN float tmin_[packet_size], tmax_[packet_size];
