@@ -48,6 +48,7 @@ public:
     void trace_mesh(const SimdJob& rays, SceneLevel& level, const MeshTree& mesh,
                     std::uint32_t number, const Kernel& kernel) {
         SimdJob job = rays;
+        job.hits = {};
         if (rays.order != nullptr) {  // kernels take no order here
             level.listed.resize(rays.n);
             for (std::size_t k = 0; k < rays.n; ++k) level.listed[k] = rays.rays[rays.order[k]];

@@ -337,12 +337,13 @@ private:
         if (sees(job_.limits[id].mask, place.scene, placed))
             add(line_of(place, from, ray), id, place.scene, placed, to);
     }
-    /// Of a direction that the caller's, a power of two times it, has: whether each component is
-    /// all that the caller's is.
-    static HWY_INLINE bool keeps_digits(Vec3 scaled) {
-        constexpr float least = std::numeric_limits<float>::min();
-        return std::fabs(scaled.x) >= least && std::fabs(scaled.y) >= least &&
-               std::fabs(scaled.z) >= least;
+    /// Whether a direction, a power of two times the caller's, has all digits of it. The least of
+    /// ordinary floats may be what less was rounded to.
+    static HWY_INLINE bool keeps_digits(Vec3 scaled, Vec3 given) {
+        const auto keeps = [](float x, float from) {
+            return std::fabs(x) > std::numeric_limits<float>::min() || from == 0;
+        };
+        return keeps(scaled.x, given.x) && keeps(scaled.y, given.y) && keeps(scaled.z, given.z);
     }
     /// At most lanes16 of them.
     HWY_INLINE void add_vector(const Place& place, const PlacedScene& placed,
@@ -355,7 +356,8 @@ private:
         for (std::uint32_t l = 0; l < count; ++l) {
             const SceneRaySource& source = from.sources[rays[l]];
             as_they_are =
-                as_they_are && (source.scale == 1.0 || keeps_digits(from.rays[rays[l]].direction));
+                as_they_are && (source.scale == 1.0 || keeps_digits(from.rays[rays[l]].direction,
+                                                                    job_.ray(source.id).direction));
             to.sources[to.count + l] = source;
         }
         RayVectors vectors = read_rays(from.rays.data(), index);

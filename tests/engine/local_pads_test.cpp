@@ -145,5 +145,27 @@ TEST(LocalPads, FilesAndRefitsKeepThem) {
     }
 }
 
+/// Such rays are valid, begin behind everything and have no hits: nothing may be written for them.
+TEST(LocalPads, AllHitsOfRaysThatBeginAtInfinity) {
+    const Mesh mesh = thing_with_stray({0, 0, 0}, 1e4f, true, 500);
+    Scene inside;
+    inside.add(mesh);
+    inside.commit();
+    Scene scene;
+    scene.add(mesh);
+    scene.add(inside, Transform{});
+    scene.commit();
+    std::vector<Ray> rays = rays_about({0, 0, 0}, 1e4f, 1000);
+    for (Ray& ray : rays) ray.origin = ray.origin * 1e-6f, ray.direction = {0.1f, 0.2f, 1};
+    SceneTraceOptions options;
+    options.path = SimdPath::packet;
+    options.threads = 1;
+    static_cast<void>(trace(scene, std::span(rays).first(16), options));
+    for (Ray& ray : std::span(rays).subspan(16)) ray.tmin = ray.tmax = infinity;
+    const AllHits all = trace_all(scene, rays, options);
+    EXPECT_EQ(all.offsets[16], all.offsets[rays.size()]);
+    EXPECT_EQ(all.counts.invalid_rays, 0u);
+}
+
 }  // namespace
 }  // namespace raydix

@@ -94,7 +94,7 @@ struct Plan {
           few(rays.size() < 32) {
         if (automatic)
             look = look_at(tree.arrays().bounds, rays);
-        else if (look.path != SimdPath::single && !counted)
+        else if (look.path != SimdPath::single && !counted && can_stream)
             look.scaled = look_at(tree.arrays().bounds, rays).scaled;
         // Rays together share one pad.
         if (automatic && tree.arrays().local_pads) look.path = SimdPath::single;

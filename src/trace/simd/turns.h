@@ -112,10 +112,12 @@ public:
         }
         return false;
     }
+    /// Nothing where all hits are wanted: a ray that has none leaves none.
     HWY_INLINE void set(std::size_t i, const TreeHit& hit) const {
+        if (job_.all != nullptr) return;
         if (job_.hits)
             job_.hits.put(i, hit);
-        else if (job_.all == nullptr)
+        else
             job_.occluded[i] = hit.hit() ? 1 : 0;
     }
 
