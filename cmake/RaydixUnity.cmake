@@ -7,8 +7,8 @@ function(raydix_unity target batch)
     set_target_properties(${target} PROPERTIES UNITY_BUILD ${RAYDIX_UNITY} UNITY_BUILD_BATCH_SIZE ${batch})
 endfunction()
 
-# Sources of a target, `batch` at a time, those that are left out (RAYDIX_SKIP) among them: the others stay with whom they
-# are with in every preset, and names of one file meet those of the same files.
+# Sources of a target, `batch` at a time. Those that a preset leaves out (RAYDIX_SKIP) are counted too: a file meets the
+# same others in every preset.
 function(raydix_unity_in_order target batch)
     set_target_properties(${target} PROPERTIES UNITY_BUILD ${RAYDIX_UNITY} UNITY_BUILD_MODE GROUP)
     set(count 0)
