@@ -9,6 +9,9 @@
 
 #include <hwy/highway.h>
 
+#include <cmath>
+#include <limits>
+
 #include "engine/scene_job.h"
 #include "trace/simd/packets.h"
 
@@ -51,6 +54,25 @@ struct HalfOfRays {
 HWY_INLINE bool all_usual(hn::Vec<I16> codes) {
     const auto odd = hn::Set(I16(), static_cast<std::int32_t>(odd_ray_class));
     return hn::AllTrue(I16(), hn::Ne(codes, odd));
+}
+
+/// Whether a direction, a power of two times the caller's, has all digits of it. The least of
+/// ordinary floats may be what less was rounded to.
+HWY_INLINE bool keeps_digits(Vec3 scaled, Vec3 given) {
+    const auto keeps = [](float x, float from) {
+        return std::fabs(x) > std::numeric_limits<float>::min() || from == 0;
+    };
+    return keeps(scaled.x, given.x) && keeps(scaled.y, given.y) && keeps(scaled.z, given.z);
+}
+
+/// The class of packet_size rays; odd_ray_class if they differ.
+HWY_INLINE std::uint32_t class_of(const Ray* rays, const std::int32_t* index) {
+    const auto first = classify(read_rays(rays, index));
+    const auto code = hn::Set(I16(), hn::GetLane(first));
+    auto same = hn::Eq(first, code);
+    for (std::size_t i = lanes16; i < packet_size; i += lanes16)
+        same = hn::And(same, hn::Eq(classify(read_rays(rays, index + i)), code));
+    return hn::AllTrue(I16(), same) ? static_cast<std::uint32_t>(hn::GetLane(code)) : odd_ray_class;
 }
 
 /// Into a placed scene. False, and nothing, if any of them needs another scale, or can hit nothing

@@ -337,14 +337,6 @@ private:
         if (sees(job_.limits[id].mask, place.scene, placed))
             add(line_of(place, from, ray), id, place.scene, placed, to);
     }
-    /// Whether a direction, a power of two times the caller's, has all digits of it. The least of
-    /// ordinary floats may be what less was rounded to.
-    static HWY_INLINE bool keeps_digits(Vec3 scaled, Vec3 given) {
-        const auto keeps = [](float x, float from) {
-            return std::fabs(x) > std::numeric_limits<float>::min() || from == 0;
-        };
-        return keeps(scaled.x, given.x) && keeps(scaled.y, given.y) && keeps(scaled.z, given.z);
-    }
     /// At most lanes16 of them.
     HWY_INLINE void add_vector(const Place& place, const PlacedScene& placed,
                                const std::uint32_t* rays, std::uint32_t count, SceneLevel& to) {
@@ -439,16 +431,6 @@ private:
             else
                 walk_stream(rays, tree, leaves, sorter.rays(code), same, code);
         }
-    }
-    /// Of a packet's rays; odd_ray_class if they differ.
-    static HWY_INLINE std::uint32_t class_of(const Ray* rays, const std::int32_t* index) {
-        const auto first = classify(read_rays(rays, index));
-        const auto code = hn::Set(I16(), hn::GetLane(first));
-        auto same = hn::Eq(first, code);
-        for (std::size_t i = lanes16; i < packet_size; i += lanes16)
-            same = hn::And(same, hn::Eq(classify(read_rays(rays, index + i)), code));
-        return hn::AllTrue(I16(), same) ? static_cast<std::uint32_t>(hn::GetLane(code))
-                                        : odd_ray_class;
     }
     template <class Leaves>
     void walk_packets(const SimdJob& rays, const PartTree& tree, Leaves& leaves,

@@ -9,9 +9,9 @@
 #include <iostream>
 #include <limits>
 
+#include "base/same_bits.h"
 #include "primitives/zero_area.h"
 #include "proximity/closest_on_triangle.h"
-#include "support/bits.h"
 #include "support/mesh_triangles.h"
 #include "support/message.h"
 #include "support/random.h"
@@ -26,12 +26,12 @@ namespace {
 constexpr std::uint64_t closest_seed = 20051019;
 constexpr float closest_nan = std::numeric_limits<float>::quiet_NaN();
 
-using test::corners, test::same_float, test::Random;
+using test::corners, test::Random;
 
 bool same(const ClosestPoint& a, const ClosestPoint& b) {
-    return a.prim == b.prim && same_float(a.distance, b.distance) && same_float(a.u, b.u) &&
-           same_float(a.v, b.v) && same_float(a.position.x, b.position.x) &&
-           same_float(a.position.y, b.position.y) && same_float(a.position.z, b.position.z);
+    return a.prim == b.prim && same_bits(a.distance, b.distance) && same_bits(a.u, b.u) &&
+           same_bits(a.v, b.v) && same_bits(a.position.x, b.position.x) &&
+           same_bits(a.position.y, b.position.y) && same_bits(a.position.z, b.position.z);
 }
 
 ClosestPoint look_at_all(const Mesh& mesh, Vec3 q, float max_distance = infinity) {
@@ -167,7 +167,7 @@ TEST(Closest, PositionsRepeatTheDistance) {
     for (std::size_t i = 0; i < queries.size(); ++i) {
         ASSERT_TRUE(found[i].found());
         const Vec3 d = found[i].position - queries[i];
-        EXPECT_TRUE(same_float(found[i].distance, std::sqrt((d.x * d.x + d.y * d.y) + d.z * d.z)));
+        EXPECT_TRUE(same_bits(found[i].distance, std::sqrt((d.x * d.x + d.y * d.y) + d.z * d.z)));
         EXPECT_TRUE(same(closest_point(bvh, queries[i]), found[i]));
     }
 }

@@ -9,9 +9,9 @@
 #include <iostream>
 #include <limits>
 
+#include "base/same_bits.h"
 #include "proximity/sweep_walk.h"
 #include "proximity/touch_walk.h"
-#include "support/bits.h"
 #include "support/exact_overlap_reference.h"
 #include "support/mesh_triangles.h"
 #include "support/random.h"
@@ -26,7 +26,7 @@ constexpr std::uint64_t overlap_seed = 19880711;
 constexpr float overlap_nan = std::numeric_limits<float>::quiet_NaN();
 constexpr const char* some_builders[] = {"karras", "apetrei", "hploc", "binned", "split", "sbvh"};
 
-using test::corners, test::same_float, test::Random;
+using test::corners, test::Random;
 
 bool touch(const Segment& s, const LeafTriangle& t) {
     return segment_touches_triangle(s.a, s.b, t);
@@ -152,8 +152,7 @@ void expect_sweeps(const std::string& name, const Mesh& mesh,
             const std::vector<SweepHit> found = sweep_spheres(bvh, list, {.threads = threads});
             std::size_t wrong = 0;
             for (std::size_t k = 0; k < list.size(); ++k)
-                wrong +=
-                    !same_float(found[k].t, expected[k].t) || found[k].prim != expected[k].prim;
+                wrong += !same_bits(found[k].t, expected[k].t) || found[k].prim != expected[k].prim;
             EXPECT_EQ(wrong, 0u) << name << ' ' << builder << ' ' << threads;
         }
 }
@@ -210,7 +209,7 @@ TEST(Overlap, SweepsWithoutARadiusAreRays) {
     for (const SphereSweep& sweep : list) {
         const Hit ray = closest_hit(bvh, sweep.path);
         const SweepHit hit = sweep_sphere(bvh, sweep);
-        EXPECT_TRUE(same_float(hit.t, ray.t));
+        EXPECT_TRUE(same_bits(hit.t, ray.t));
         EXPECT_EQ(hit.prim, ray.prim);
     }
 }
@@ -247,7 +246,7 @@ TEST(Overlap, SweepsFromAfarFindParts) {
             const Bvh bvh = build_bvh(mesh, {.builder = builder, .max_leaf = max_leaf});
             const SweepHit hit = sweep_sphere(bvh, sweep);
             EXPECT_EQ(hit.prim, whole.prim) << builder_name(builder) << ' ' << max_leaf;
-            EXPECT_TRUE(same_float(hit.t, whole.t));
+            EXPECT_TRUE(same_bits(hit.t, whole.t));
         }
     EXPECT_TRUE(build_bvh(mesh, {.builder = Builder::sbvh, .max_leaf = 1}).has_split_primitives());
 }
