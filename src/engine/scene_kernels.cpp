@@ -30,10 +30,13 @@ inline void trace_scene(SceneJob& job) {
 /// All hits of the rays of a job. One after the other if they go alone, have a filter, or their
 /// numbers have no room beside those of paths.
 inline void all_scene_hits(SceneJob& job) {
-    if (job.single || job.filter != nullptr || !HitsOfJob::has_room(job))
+    if (job.single || job.filter != nullptr || !HitsOfJob::has_room(job)) {
         all_hits_one_by_one(job);
-    else
-        SceneWalk<false, true>(job).run();
+        return;
+    }
+    HitsOfJob hits(job);
+    SceneWalk<false>(job, &hits).run();
+    hits.put_in_order();
 }
 
 SceneKernels scene_kernels(std::string_view isa) {

@@ -13,6 +13,7 @@
 #include <limits>
 
 #include "engine/scene_job.h"
+#include "engine/scene_ray.h"
 #include "trace/simd/packets.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -63,6 +64,19 @@ HWY_INLINE bool keeps_digits(Vec3 scaled, Vec3 given) {
         return std::fabs(x) > std::numeric_limits<float>::min() || from == 0;
     };
     return keeps(scaled.x, given.x) && keeps(scaled.y, given.y) && keeps(scaled.z, given.z);
+}
+
+/// Scales a ray, the longest of its components being `longest`. False, and nothing, if parts and
+/// meshes need different scales of it.
+inline HWY_NOINLINE bool rescale(float longest, Ray& ray, double& scale) {
+    const double by = line_scale(double{longest});
+    if (by > largest_ray_scale) return false;
+    scale = by;
+    const Double3 scaled = Double3(ray.direction) * by;
+    ray.direction = scaled.rounded();
+    ray.tmin = start_in_units(ray.tmin, by);
+    ray.tmax = end_in_units(by, ray.tmax);
+    return true;
 }
 
 /// The class of packet_size rays; odd_ray_class if they differ.

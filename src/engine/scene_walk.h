@@ -25,27 +25,19 @@
 HWY_BEFORE_NAMESPACE();
 namespace raydix::HWY_NAMESPACE {
 
-/// `all`: all hits, not the closest; without a filter.
-template <bool any, bool all = false>
+/// Closest or any hits.
+template <bool any>
 class SceneWalk {
-    struct Nothing {
-        explicit Nothing(SceneJob&) {}
-    };
-
 public:
-    explicit SceneWalk(SceneJob& job) : job_(job), hits_(job) {}
+    /// `all`: where all hits go instead, without a filter; or null.
+    explicit SceneWalk(SceneJob& job, HitsOfJob* all = nullptr) : job_(job), all_(all) {}
 
     void run() {
         job_.hits.assign(job_.n, {});
         job_.limits.resize(job_.n);
         job_.invalid = 0;
         job_.single_stack.reserve_words(job_.tree->stack_size);
-        if constexpr (all) {
-            together();
-            hits_.put_in_order();
-        } else {
-            job_.single ? one_by_one() : together();
-        }
+        job_.single&& all_ == nullptr ? one_by_one() : together();
     }
 
 private:
@@ -61,6 +53,7 @@ private:
         std::uint32_t number;  // of the path of instances; 0: none
     };
 
+    [[nodiscard]] bool wants_all() const { return !any && all_ != nullptr; }
     [[nodiscard]] std::size_t place_of(std::size_t k) const {
         return job_.order == nullptr ? k : job_.order[k];
     }
@@ -100,12 +93,12 @@ private:
     HWY_INLINE void alone(std::uint32_t id, bool nearest_first, const Walk& walk) {
         const WideStackView stack = job_.single_stack.view();
         const SceneJob::Limits& limits = job_.limits[id];
-        if constexpr (all) {
-            const std::size_t before = hits_.found().size();
-            SceneRay<Wanted::all> one(limits, job_.place(id), {}, stack, &hits_.found(),
+        if (wants_all()) {
+            const std::size_t before = all_->found().size();
+            SceneRay<Wanted::all> one(limits, job_.place(id), {}, stack, &all_->found(),
                                       nearest_first);
             walk(one);
-            hits_.give(before, id);
+            all_->give(before, id);
         } else if (job_.filter == nullptr) {
             SceneRay<wanted> one(limits, job_.place(id), job_.hits[id], stack, nullptr,
                                  nearest_first);
@@ -152,44 +145,76 @@ private:
         return true;
     }
 
-    /// What takes rays on at the leaves of a tree over parts, one each (single.h).
-    class Parts {
+    /// What takes rays on at the leaves of a tree (single.h). Packets and streams through parts and
+    /// through shapes have one code.
+    class Leaves {
+    public:
+        static constexpr bool packets_nearest_first = true, large = true;
+        const bool nearest_first;
+
+        virtual float visit_one(std::uint32_t first, std::uint32_t count, std::uint32_t ray) = 0;
+        virtual void visit(std::uint32_t first, std::uint32_t parts, const std::uint32_t* rays,
+                           std::uint32_t count) = 0;
+        float reach(std::uint32_t ray) { return walk_.shorten(level_, ray); }
+        RAYDIX_PREFETCHING void ask_for(std::uint32_t word) const {
+            if (shapes_ != nullptr) ask_for_shapes(*shapes_, word);
+        }
+
+    protected:
+        /// `shapes`: to ask for what lies in their leaves, which is large; or null.
+        Leaves(SceneWalk& walk, const Place& place, const ShapeTree* shapes)
+            : nearest_first(shapes == nullptr),
+              walk_(walk),
+              level_(walk.job_.level(place.depth)),
+              place_(place),
+              shapes_(shapes) {}
+        ~Leaves() = default;
+
+        SceneWalk& walk_;
+        SceneLevel& level_;
+        const Place& place_;
+
+    private:
+        const ShapeTree* const shapes_;
+    };
+
+    /// Of a tree over parts, one each.
+    class Parts final : public Leaves {
+        using Leaves::level_, Leaves::place_, Leaves::walk_;
+
     public:
         Parts(SceneWalk& walk, const Place& place, const PartTree& tree)
-            : walk_(walk), level_(walk.job_.level(place.depth)), place_(place), tree_(tree) {}
+            : Leaves(walk, place, nullptr), tree_(tree) {}
 
-        float visit_one(std::uint32_t leaf, std::uint32_t, std::uint32_t ray) {
+        float visit_one(std::uint32_t leaf, std::uint32_t, std::uint32_t ray) override {
             walk_.alone(level_.sources[ray].id, true, [&](auto& one) {
                 one.visit(place_.scene, tree_.part[leaf], place_.number,
                           walk_.line_of(place_, level_, ray));
             });
-            return reach(ray);
+            return this->reach(ray);
         }
         void visit(std::uint32_t leaf, std::uint32_t, const std::uint32_t* rays,
-                   std::uint32_t count) {
+                   std::uint32_t count) override {
             if (count < least_together) {
                 for (std::uint32_t k = 0; k < count; ++k) visit_one(leaf, 1, rays[k]);
             } else {
                 walk_.visit(place_, tree_.part[leaf], rays, count);
             }
         }
-        float reach(std::uint32_t ray) { return walk_.shorten(level_, ray); }
-        static constexpr bool nearest_first = true, packets_nearest_first = true, large = false;
 
     private:
-        SceneWalk& walk_;
-        SceneLevel& level_;
-        const Place& place_;
         const PartTree& tree_;
     };
 
-    /// The same at the leaves of a tree over shapes.
-    class AtShapes {
+    /// Of a tree over shapes.
+    class AtShapes final : public Leaves {
+        using Leaves::level_, Leaves::place_, Leaves::walk_;
+
     public:
         AtShapes(SceneWalk& walk, const Place& place, const ShapeTree& tree)
-            : walk_(walk), level_(walk.job_.level(place.depth)), place_(place), tree_(tree) {}
+            : Leaves(walk, place, &tree), tree_(tree) {}
 
-        float visit_one(std::uint32_t first, std::uint32_t count, std::uint32_t ray) {
+        float visit_one(std::uint32_t first, std::uint32_t count, std::uint32_t ray) override {
             if (const UserGeometry* const user = tree_.user()) {
                 visit_user(*user, first, &ray, 1);
             } else {
@@ -200,19 +225,16 @@ private:
                     return any;
                 });
             }
-            return reach(ray);
+            return this->reach(ray);
         }
         void visit(std::uint32_t first, std::uint32_t parts, const std::uint32_t* rays,
-                   std::uint32_t count) {
+                   std::uint32_t count) override {
             if (const UserGeometry* const user = tree_.user()) {
                 visit_user(*user, first, rays, count);
             } else {
                 for (std::uint32_t k = 0; k < count; ++k) visit_one(first, parts, rays[k]);
             }
         }
-        float reach(std::uint32_t ray) { return walk_.shorten(level_, ray); }
-        static constexpr bool nearest_first = false, packets_nearest_first = true, large = true;
-        RAYDIX_PREFETCHING void ask_for(std::uint32_t word) const { ask_for_shapes(tree_, word); }
 
     private:
         [[nodiscard]] SceneJob::Limits& limits(std::uint32_t ray) {
@@ -225,8 +247,8 @@ private:
         /// Whether it counts, and is the best.
         HWY_INLINE bool take(std::uint32_t ray, const TreeHit& hit, double scale) {
             const std::uint32_t id = level_.sources[ray].id;
-            if constexpr (all) {
-                walk_.hits_.add(tree_, place_.number, scale, hit, id);
+            if (walk_.wants_all()) {
+                walk_.all_->add(tree_, place_.number, scale, hit, id);
                 return false;
             }
             if (walk_.job_.filter != nullptr &&
@@ -259,9 +281,6 @@ private:
             }
         }
 
-        SceneWalk& walk_;
-        SceneLevel& level_;
-        const Place& place_;
         const ShapeTree& tree_;
     };
 
@@ -280,20 +299,10 @@ private:
         level.sources[level.count] = {1.0, id};
         const Vec3 d = ray.direction;
         const float longest = max_of(max_of(std::fabs(d.x), std::fabs(d.y)), std::fabs(d.z));
-        const bool taken = near_unit_length(longest) || rescale(level, longest);
+        const bool taken = near_unit_length(longest) || rescale(longest, level.rays[level.count],
+                                                                level.sources[level.count].scale);
         level.count += static_cast<std::size_t>(taken);
         return taken;
-    }
-    HWY_NOINLINE bool rescale(SceneLevel& level, float longest) {
-        const double scale = line_scale(double{longest});
-        if (scale > largest_ray_scale) return false;
-        Ray& ray = level.rays[level.count];
-        level.sources[level.count].scale = scale;
-        const Double3 scaled = Double3(ray.direction) * scale;
-        ray.direction = scaled.rounded();
-        ray.tmin = start_in_units(ray.tmin, scale);
-        ray.tmax = end_in_units(scale, ray.tmax);
-        return true;
     }
 
     /// Ray `ray` of one level, in double.
@@ -394,7 +403,6 @@ private:
 
     /// Rays list[0] to list[count - 1] of a level, or its first `count`, through a tree over parts
     /// or shapes. The list is not needed once leaves are visited.
-    template <class Leaves>
     HWY_NOINLINE void walk_tree(const Place& place, const PartTree& tree, Leaves& leaves,
                                 StackMemory& stack, StreamMemory& memory, const std::uint32_t* list,
                                 std::uint32_t count) {
@@ -432,7 +440,6 @@ private:
                 walk_stream(rays, tree, leaves, sorter.rays(code), same, code);
         }
     }
-    template <class Leaves>
     void walk_packets(const SimdJob& rays, const PartTree& tree, Leaves& leaves,
                       const std::int32_t* index, std::uint32_t count, std::uint32_t code) {
         Packet packet;
@@ -448,7 +455,6 @@ private:
                 .trace();
         }
     }
-    template <class Leaves>
     void walk_stream(const SimdJob& rays, const PartTree& tree, Leaves& leaves,
                      const std::int32_t* index, std::uint32_t count, std::uint32_t code) {
         SimdCounts counts;
@@ -516,7 +522,7 @@ private:
         const std::size_t stack_size = wide_stack_capacity(mesh.tree->stats().max_depth);
         level.mesh_stack.reserve_words(stack_size * rays_in_turn);
         if (any && level.occluded.size() < level.count) level.occluded.resize(level.count);
-        if (!any && !all && level.hits.size() < level.count) level.hits.resize(level.count);
+        if (!any && !wants_all() && level.hits.size() < level.count) level.hits.resize(level.count);
         TriangleBlock room{};
         WideView view = mesh.view;
         view.room = &room;
@@ -537,8 +543,8 @@ private:
                           nullptr,
                           job_.filter == nullptr ? nullptr : &check};
         SimdCounts counts;
-        if constexpr (all) {
-            hits_.trace_mesh(job, level, mesh, place.number,
+        if (wants_all()) {
+            all_->trace_mesh(job, level, mesh, place.number,
                              count < least_together || view.local_pads ? job_.kernels->single
                                                                        : job_.kernels->packets);
             return;
@@ -583,7 +589,7 @@ private:
     }
 
     SceneJob& job_;
-    [[no_unique_address]] std::conditional_t<all, HitsOfJob, Nothing> hits_;
+    HitsOfJob* const all_;
 };
 
 }  // namespace raydix::HWY_NAMESPACE

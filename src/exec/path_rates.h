@@ -82,6 +82,23 @@ public:
         adding_.clear(std::memory_order_release);
     }
 
+    /// Rays of another view come: what is known of all ways soon counts as little as one trial. Not
+    /// again within so many jobs.
+    void see(std::uint32_t view) {
+        constexpr std::uint32_t wait = 4, again = 32;
+        if (view_.load(std::memory_order_relaxed) == view) return;
+        const std::uint32_t job = jobs_.load(std::memory_order_relaxed);
+        const std::uint32_t before = seen_.load(std::memory_order_relaxed);
+        if (before != 0 && job - before < again) return;
+        view_.store(view, std::memory_order_relaxed);
+        seen_.store(job, std::memory_order_relaxed);
+        for (std::size_t way = 0; way < way_count; ++way) {
+            if (trials_[way].load(std::memory_order_relaxed) < 2) continue;
+            trials_[way].store(1, std::memory_order_relaxed);
+            due_[way].store(job + wait, std::memory_order_relaxed);
+        }
+    }
+
     /// Whether job number `job` should try `way`.
     [[nodiscard]] bool is_due(Way way, std::uint32_t job) const {
         return static_cast<std::int32_t>(waited(way, job)) >= 0;
@@ -242,6 +259,7 @@ private:
     std::array<std::atomic<std::uint32_t>, way_count> due_{};
     std::array<std::atomic<std::uint8_t>, way_count> trials_{};
     std::atomic<std::uint64_t> open_{0};
+    std::atomic<std::uint32_t> view_{0}, seen_{0};
     std::atomic_flag adding_;
 };
 
@@ -251,6 +269,9 @@ struct BatchKind {
     std::uint32_t apart = 0;   // where rays start that follow each other: 0 close together to 3
     std::uint32_t spread = 0;  // of their directions: 0 to 2
     std::uint32_t size = 0;    // of the batch: 0 to 4
+    /// Where rays start that go from about one place in about one direction, and where to, roughly:
+    /// equal for views that are alike. 0: others. It has no part in the index.
+    std::uint32_t view = 0;
 
     static constexpr std::size_t count = 2 * 2 * 4 * 3 * 5;
     [[nodiscard]] std::size_t index() const {
@@ -280,8 +301,11 @@ public:
     /// From now on both know what either learns: a tree that follows another one is much like it.
     void share(const PathRates& other) { known_ = other.known_; }
 
+    /// For a batch that comes.
     [[nodiscard]] PathWayRates& ways(const BatchKind& kind) {
-        return known_->table().ways[kind.index()];
+        PathWayRates& rates = known_->table().ways[kind.index()];
+        if (kind.view != 0) rates.see(kind.view);
+        return rates;
     }
     [[nodiscard]] OrderRates& orders(const BatchKind& kind) {
         return known_->table().orders[kind.index()];

@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "support/support.h"
+#include "trace/simd/wide_batch.h"
 
 namespace raydix::test {
 namespace {
@@ -169,6 +170,58 @@ TEST(PathRates, OneThatStoodStillForAWhileDecidesLittle) {
     for (const float nonsense : {0.0f, -1.0f, std::numeric_limits<float>::quiet_NaN()})
         rates.add(PathWay::packets, PathWay::streams, nonsense);
     EXPECT_EQ(rates.fastest(three_ways), PathWay::streams);
+}
+
+TEST(PathRates, AnotherViewIsLearntWithinItsFirstJobs) {
+    const auto run = [](Rates& rates, int jobs, const Costs& costs) {
+        for (int job = 0; job < jobs; ++job) shares_of(rates, three_ways, 1024, costs);
+    };
+    constexpr Costs one{100, 300, 200, 100}, other{200, 300, 100, 100};
+    Rates sees, blind;
+    for (Rates* const rates : {&sees, &blind}) {
+        rates->see(1);
+        run(*rates, 2000, one);
+        EXPECT_EQ(rates->fastest(three_ways), PathWay::packets);
+    }
+    sees.see(2);
+    run(sees, 8, other);
+    run(blind, 8, other);
+    EXPECT_EQ(sees.fastest(three_ways), PathWay::turns);
+    EXPECT_EQ(blind.fastest(three_ways), PathWay::packets);
+}
+
+TEST(PathRates, ViewsThatAlternateAreSeenOnceInAWhile) {
+    Rates rates;
+    constexpr Costs costs{100, 300, 250, 100};
+    std::size_t others = 0, all = 0;
+    for (std::uint32_t job = 0; job < 4000; ++job) {
+        rates.see(1 + job % 2);
+        for (const Share& share : shares_of(rates, three_ways, 1024, costs)) {
+            all += share.end - share.begin;
+            others += share.way == PathWay::packets ? 0 : share.end - share.begin;
+        }
+    }
+    EXPECT_LT(others * 25, all);
+}
+
+TEST(PathRates, OnlyBatchesFromOnePlaceInOneDirectionAreViews) {
+    const Aabb bounds{{0, 0, 0}, {1, 1, 1}};
+    const auto view = [&](Vec3 from, Vec3 to, std::size_t rays) {
+        return look_at(bounds, std::vector<Ray>(rays, Ray{from, 0, to})).kind.view;
+    };
+    const Vec3 place{0.53f, 0.53f, 0.53f}, along{0, 0, 1};
+    const std::uint32_t first = view(place, along, 10000);
+    EXPECT_NE(first, 0u);
+    EXPECT_EQ(view({0.54f, 0.53f, 0.53f}, {0.1f, 0.1f, 1}, 20000), first);
+    EXPECT_EQ(view(place, {0, 0, 100}, 10000), first);
+    EXPECT_NE(view({0.9f, 0.53f, 0.53f}, along, 10000), first);
+    EXPECT_NE(view(place, {1, 0, 0}, 10000), first);
+    EXPECT_NE(view({1e30f, 1e30f, -1e30f}, along, 10000), 0u);
+    EXPECT_EQ(view(place, along, 8191), 0u);
+    EXPECT_EQ(view(place, {0, 0, 0}, 10000), 0u);
+    std::vector<Ray> apart(10000, Ray{place, 0, along});
+    for (std::size_t i = 0; i < apart.size(); i += 2) apart[i].origin.x = 0.1f;
+    EXPECT_EQ(look_at(bounds, apart).kind.view, 0u);
 }
 
 TEST(PathRates, TimesFarOffEitherWayCancel) {

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstring>
 #include <limits>
 #include <memory>
@@ -454,6 +455,33 @@ bool passes_by(const Aabb& box, const Ray& ray) {
 
 }  // namespace
 
+namespace {
+
+/// Fewer rays are often a part of a picture, of which each part has a view of its own.
+constexpr std::size_t least_rays_of_view = 8192;
+
+/// Rounded down; far off all are one.
+std::uint32_t cell_of(float x) {
+    constexpr float most = 1000;
+    return static_cast<std::uint32_t>(static_cast<int>(std::floor(std::clamp(x, -most, most))));
+}
+/// BatchKind::view of rays like this one.
+std::uint32_t view_of(const Aabb& bounds, float longest_side, const Ray& ray) {
+    constexpr float places = 16, directions = 4;
+    constexpr float most = std::numeric_limits<float>::max();
+    if (!is_valid(ray) || !(longest_side > 0 && longest_side <= most)) return 0;
+    const float longest = longest_of(ray);
+    const Vec3 from = ray.origin - bounds.lo, d = ray.direction;
+    std::uint32_t view = 1;
+    for (const float at : {from.x, from.y, from.z})
+        view = view * 61 + cell_of(at / longest_side * places);
+    for (const float along : {d.x, d.y, d.z})
+        view = view * 61 + cell_of(along / longest * directions);
+    return view == 0 ? 1 : view;
+}
+
+}  // namespace
+
 BatchLook look_at(const Aabb& bounds, std::span<const Ray> rays) {
     const FloatEnvironment plain;
     constexpr std::size_t largest_window = 64;
@@ -497,6 +525,8 @@ BatchLook look_at(const Aabb& bounds, std::span<const Ray> rays) {
         look.scaled = 8 * odd >= window * looked_at;
         look.passing = 8 * passing >= put_to_bounds * looked_at;
     }
+    if (rays.size() >= least_rays_of_view && look.kind.apart == 0 && look.kind.spread == 0)
+        look.kind.view = view_of(bounds, longest_side, rays[rays.size() / 2]);
     if (4 * coherent < 3 * looked_at)
         look.path = 2 * close >= looked_at ? SimdPath::stream : SimdPath::sorted;
     return look;
