@@ -568,8 +568,7 @@ FAULTS = [
           "scenes: a scaled ray begins in other units", "engine"),
     Fault("src/engine/scene_walk.h", "walk_.all_->add(tree_, place_.number, scale, hit, id);", "walk_.all_->add(tree_, 0, scale, hit, id);",
           "all hits: shapes in instances are the scene's own", "engine"),
-    Fault("src/exec/path_rates.h", "trials_[way].store(1, std::memory_order_relaxed);", "",
-          "ways: another view changes nothing", "trace"),
-    Fault("src/trace/simd/trace_wide.cpp", "view = view * 61 + cell_of(along / longest * directions);", "view = view * 61;",
+    Fault("src/exec/path_rates.h", "if (kind.view) rates.see(*kind.view);", "", "ways: another view changes nothing", "trace"),
+    Fault("src/exec/path_rates.h", "std::fabs(way[axis] - other.way[axis]) > turn", "false",
           "ways: a camera that turned has the view it had", "trace"),
 ]

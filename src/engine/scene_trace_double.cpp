@@ -66,9 +66,7 @@ BatchLook look_at(const WideTreeD& tree, std::span<const RayD> rays) {
             Double3(ray.direction).round_to(near.direction);
         }
     }
-    BatchLook look = raydix::look_at(tree.arrays.bounds, some);
-    look.kind.size = BatchKind::size_of(rays.size());
-    return look;
+    return raydix::look_at(tree.arrays.bounds, some, rays.size());
 }
 
 /// How a batch goes.

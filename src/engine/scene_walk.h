@@ -37,7 +37,8 @@ public:
         job_.limits.resize(job_.n);
         job_.invalid = 0;
         job_.single_stack.reserve_words(job_.tree->stack_size);
-        job_.single&& all_ == nullptr ? one_by_one() : together();
+        const bool alone = job_.single && all_ == nullptr;
+        alone ? one_by_one() : together();
     }
 
 private:
@@ -161,7 +162,7 @@ private:
         }
 
     protected:
-        /// `shapes`: to ask for what lies in their leaves, which is large; or null.
+        /// `shapes`: whose nodes and primitives, which are large, are asked for; or null.
         Leaves(SceneWalk& walk, const Place& place, const ShapeTree* shapes)
             : nearest_first(shapes == nullptr),
               walk_(walk),

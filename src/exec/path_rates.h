@@ -11,6 +11,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -21,6 +22,22 @@ namespace raydix {
 enum class PathWay : std::uint8_t { packets, streams, turns, alone };
 /// In which order: as the caller has them, or by where they start.
 enum class RayOrder : std::uint8_t { given, sorted };
+
+/// Of a batch from about one place in about one direction, as a picture is.
+struct BatchView {
+    // Where its middle ray starts, in longest sides of the scene, and where to, the longest 1.
+    std::array<float, 3> place{}, way{};
+
+    /// Whether a camera has jumped from there, or turned.
+    [[nodiscard]] bool is_far_from(const BatchView& other) const {
+        constexpr float step = 1.0f / 16, turn = 0.25f;
+        for (std::size_t axis = 0; axis < 3; ++axis)
+            if (std::fabs(place[axis] - other.place[axis]) > step ||
+                std::fabs(way[axis] - other.way[axis]) > turn)
+                return true;
+        return false;
+    }
+};
 
 /// What ways took for batches that are alike, each in times of the others. Any number of threads
 /// may add to it and ask it at once. Way: an enum of `way_count` values. Clock: as in std::chrono.
@@ -82,21 +99,26 @@ public:
         adding_.clear(std::memory_order_release);
     }
 
-    /// Rays of another view come: what is known of all ways soon counts as little as one trial. Not
-    /// again within so many jobs.
-    void see(std::uint32_t view) {
-        constexpr std::uint32_t wait = 4, again = 32;
-        if (view_.load(std::memory_order_relaxed) == view) return;
+    /// A picture comes. If it is of another view, what is known of all ways counts as little as one
+    /// trial, and they are soon tried again: not within `again_` jobs, twice as many each time that
+    /// the way that is best stayed the same. Nothing if another thread adds something meanwhile.
+    void see(const BatchView& view) {
+        constexpr std::uint32_t wait = 4, least_again = 32, most_again = 1024;
+        if (adding_.test_and_set(std::memory_order_acquire)) return;
         const std::uint32_t job = jobs_.load(std::memory_order_relaxed);
-        const std::uint32_t before = seen_.load(std::memory_order_relaxed);
-        if (before != 0 && job - before < again) return;
-        view_.store(view, std::memory_order_relaxed);
-        seen_.store(job, std::memory_order_relaxed);
-        for (std::size_t way = 0; way < way_count; ++way) {
-            if (trials_[way].load(std::memory_order_relaxed) < 2) continue;
-            trials_[way].store(1, std::memory_order_relaxed);
-            due_[way].store(job + wait, std::memory_order_relaxed);
+        if (!view_) {
+            view_ = view;
+        } else if (view.is_far_from(*view_) && job - seen_ >= again_) {
+            const std::size_t best = best_known();
+            again_ = best == best_seen_ ? std::min(2 * again_, most_again) : least_again;
+            best_seen_ = best, seen_ = job, view_ = view;
+            for (std::size_t way = 0; way < way_count; ++way) {
+                if (trials_[way].load(std::memory_order_relaxed) < 2) continue;
+                trials_[way].store(1, std::memory_order_relaxed);
+                due_[way].store(job + wait, std::memory_order_relaxed);
+            }
         }
+        adding_.clear(std::memory_order_release);
     }
 
     /// Whether job number `job` should try `way`.
@@ -126,6 +148,16 @@ private:
     }
     void set_trials(Way way, int trials) {
         trials_[index(way)].store(static_cast<std::uint8_t>(trials), std::memory_order_relaxed);
+    }
+    /// Of all ways; way_count if none is known.
+    [[nodiscard]] std::size_t best_known() const {
+        std::size_t best = way_count;
+        float least = std::numeric_limits<float>::infinity();
+        for (std::size_t way = 0; way < way_count; ++way)
+            if (const float one = costs_[way].load(std::memory_order_relaxed);
+                one > 0.0f && one < least)
+                least = one, best = way;
+        return best;
     }
     [[nodiscard]] bool is_proven(Way way) const { return trials_of(way) >= 2; }
     /// Jobs since it has been due. Numbers of jobs may wrap around.
@@ -259,7 +291,10 @@ private:
     std::array<std::atomic<std::uint32_t>, way_count> due_{};
     std::array<std::atomic<std::uint8_t>, way_count> trials_{};
     std::atomic<std::uint64_t> open_{0};
-    std::atomic<std::uint32_t> view_{0}, seen_{0};
+    // What `adding_` guards: the last view that counted, in which job, and the best way then.
+    std::optional<BatchView> view_;
+    std::uint32_t seen_ = 0, again_ = 0;
+    std::size_t best_seen_ = way_count;
     std::atomic_flag adding_;
 };
 
@@ -269,9 +304,7 @@ struct BatchKind {
     std::uint32_t apart = 0;   // where rays start that follow each other: 0 close together to 3
     std::uint32_t spread = 0;  // of their directions: 0 to 2
     std::uint32_t size = 0;    // of the batch: 0 to 4
-    /// Where rays start that go from about one place in about one direction, and where to, roughly:
-    /// equal for views that are alike. 0: others. It has no part in the index.
-    std::uint32_t view = 0;
+    std::optional<BatchView> view{};  // of pictures; it has no part in the index
 
     static constexpr std::size_t count = 2 * 2 * 4 * 3 * 5;
     [[nodiscard]] std::size_t index() const {
@@ -304,7 +337,7 @@ public:
     /// For a batch that comes.
     [[nodiscard]] PathWayRates& ways(const BatchKind& kind) {
         PathWayRates& rates = known_->table().ways[kind.index()];
-        if (kind.view != 0) rates.see(kind.view);
+        if (kind.view) rates.see(*kind.view);
         return rates;
     }
     [[nodiscard]] OrderRates& orders(const BatchKind& kind) {

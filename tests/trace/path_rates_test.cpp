@@ -172,6 +172,9 @@ TEST(PathRates, OneThatStoodStillForAWhileDecidesLittle) {
     EXPECT_EQ(rates.fastest(three_ways), PathWay::streams);
 }
 
+constexpr BatchView one_view{{0.5f, 0.5f, 0.5f}, {0, 0, 1}},
+    other_view{{0.5f, 0.5f, 0.5f}, {1, 0, 0}};
+
 TEST(PathRates, AnotherViewIsLearntWithinItsFirstJobs) {
     const auto run = [](Rates& rates, int jobs, const Costs& costs) {
         for (int job = 0; job < jobs; ++job) shares_of(rates, three_ways, 1024, costs);
@@ -179,49 +182,75 @@ TEST(PathRates, AnotherViewIsLearntWithinItsFirstJobs) {
     constexpr Costs one{100, 300, 200, 100}, other{200, 300, 100, 100};
     Rates sees, blind;
     for (Rates* const rates : {&sees, &blind}) {
-        rates->see(1);
+        rates->see(one_view);
         run(*rates, 2000, one);
         EXPECT_EQ(rates->fastest(three_ways), PathWay::packets);
     }
-    sees.see(2);
+    sees.see(other_view);
     run(sees, 8, other);
     run(blind, 8, other);
     EXPECT_EQ(sees.fastest(three_ways), PathWay::turns);
     EXPECT_EQ(blind.fastest(three_ways), PathWay::packets);
+    // Back again, and as soon: another way was the best.
+    run(sees, 32, other);
+    sees.see(one_view);
+    run(sees, 8, one);
+    EXPECT_EQ(sees.fastest(three_ways), PathWay::packets);
 }
 
-TEST(PathRates, ViewsThatAlternateAreSeenOnceInAWhile) {
+TEST(PathRates, ViewsThatChangeNothingCostLittle) {
     Rates rates;
-    constexpr Costs costs{100, 300, 250, 100};
+    std::mt19937 random(7);
+    std::lognormal_distribution<float> noise(0.0f, 0.3f);
+    constexpr std::array<float, 4> costs{100, 300, 150, 100};
     std::size_t others = 0, all = 0;
-    for (std::uint32_t job = 0; job < 4000; ++job) {
-        rates.see(1 + job % 2);
-        for (const Share& share : shares_of(rates, three_ways, 1024, costs)) {
-            all += share.end - share.begin;
-            others += share.way == PathWay::packets ? 0 : share.end - share.begin;
-        }
+    for (int job = 0; job < 20000; ++job) {
+        rates.see(job % 2 == 0 ? one_view : other_view);
+        rates.run(three_ways, 0, 1024, [&](PathWay way, std::size_t begin, std::size_t end) {
+            const float time = costs[static_cast<std::size_t>(way)] * noise(random);
+            HandClock::passed += std::chrono::nanoseconds(
+                static_cast<std::int64_t>(time * static_cast<float>(end - begin)));
+            all += end - begin;
+            others += way == PathWay::packets ? 0 : end - begin;
+        });
     }
-    EXPECT_LT(others * 25, all);
+    EXPECT_LT(others * 50, all);
+}
+
+TEST(PathRates, ATreeHearsOfViewsThroughKinds) {
+    for (const bool seen : {false, true}) {
+        PathRates rates;
+        BatchKind kind;
+        kind.size = 3;
+        if (seen) kind.view = one_view;
+        for (int trial = 0; trial < 8; ++trial)
+            rates.ways(kind).add(PathWay::turns, PathWay::packets, 0.5f);
+        if (seen) kind.view = other_view;
+        rates.ways(kind).add(PathWay::turns, PathWay::packets, 3.0f);
+        EXPECT_EQ(rates.ways(kind).fastest(three_ways), seen ? PathWay::packets : PathWay::turns);
+    }
 }
 
 TEST(PathRates, OnlyBatchesFromOnePlaceInOneDirectionAreViews) {
-    const Aabb bounds{{0, 0, 0}, {1, 1, 1}};
+    const Aabb bounds{{0, 0, 0}, {2, 1, 1}};
     const auto view = [&](Vec3 from, Vec3 to, std::size_t rays) {
         return look_at(bounds, std::vector<Ray>(rays, Ray{from, 0, to})).kind.view;
     };
-    const Vec3 place{0.53f, 0.53f, 0.53f}, along{0, 0, 1};
-    const std::uint32_t first = view(place, along, 10000);
-    EXPECT_NE(first, 0u);
-    EXPECT_EQ(view({0.54f, 0.53f, 0.53f}, {0.1f, 0.1f, 1}, 20000), first);
-    EXPECT_EQ(view(place, {0, 0, 100}, 10000), first);
-    EXPECT_NE(view({0.9f, 0.53f, 0.53f}, along, 10000), first);
-    EXPECT_NE(view(place, {1, 0, 0}, 10000), first);
-    EXPECT_NE(view({1e30f, 1e30f, -1e30f}, along, 10000), 0u);
-    EXPECT_EQ(view(place, along, 8191), 0u);
-    EXPECT_EQ(view(place, {0, 0, 0}, 10000), 0u);
+    const Vec3 place{0.5f, 0.5f, 0.5f}, along{0, 0, 1};
+    const auto first = view(place, along, 10000);
+    ASSERT_TRUE(first);
+    EXPECT_FALSE(first->is_far_from(*first));
+    EXPECT_FALSE(first->is_far_from(*view({0.6f, 0.5f, 0.5f}, {0.1f, -0.2f, 1}, 20000)));
+    EXPECT_FALSE(first->is_far_from(*view(place, {0, 0, 100}, 10000)));
+    EXPECT_TRUE(first->is_far_from(*view({0.5f, 0.64f, 0.5f}, along, 10000)));
+    EXPECT_TRUE(first->is_far_from(*view(place, {0, 0.3f, 1}, 10000)));
+    EXPECT_TRUE(first->is_far_from(*view({1e30f, 1e30f, -1e30f}, along, 10000)));
+    EXPECT_FALSE(view(place, along, 8191));
+    EXPECT_FALSE(view(place, {0, 0, 0}, 10000));
+    EXPECT_TRUE(look_at(bounds, std::vector<Ray>(2048, Ray{place, 0, along}), 8192).kind.view);
     std::vector<Ray> apart(10000, Ray{place, 0, along});
     for (std::size_t i = 0; i < apart.size(); i += 2) apart[i].origin.x = 0.1f;
-    EXPECT_EQ(look_at(bounds, apart).kind.view, 0u);
+    EXPECT_FALSE(look_at(bounds, apart).kind.view);
 }
 
 TEST(PathRates, TimesFarOffEitherWayCancel) {

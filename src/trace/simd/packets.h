@@ -138,20 +138,27 @@ private:
     /// Behind a class: what whole vectors write, and what fills the last one.
     static constexpr std::uint32_t slack = 32;
 
-    /// Calls each(code, lanes with that code) for what is in `codes`; neighbours mostly agree.
-    template <class Each>
+    /// Calls each(code, lanes with that code) for the first `count` of `codes`, which `bytes` are
+    /// as well, if neighbours mostly agree. If not that takes as long as there are codes among
+    /// them: then one(lane) for each.
+    template <class Each, class One>
     static HWY_INLINE void for_each_code(hn::Vec<I16> codes, const std::uint8_t* bytes,
-                                         std::uint32_t lanes, const Each& each) {
+                                         std::size_t count, const Each& each, const One& one) {
+        auto lanes = static_cast<std::uint32_t>((std::uint64_t{1} << count) - 1);
+        const auto agreeing = [&](std::uint32_t code) {
+            return bits_of(I16(), hn::Eq(codes, hn::Set(I16(), static_cast<std::int32_t>(code)))) &
+                   lanes;
+        };
+        if (2 * static_cast<std::size_t>(std::popcount(agreeing(bytes[0]))) < count) {
+            for (std::size_t l = 0; l < count; ++l) one(l);
+            return;
+        }
         while (lanes != 0) {
             const std::uint8_t code = bytes[std::countr_zero(lanes)];
-            const auto same = hn::Eq(codes, hn::Set(I16(), std::int32_t{code}));
-            const std::uint32_t met = bits_of(I16(), same) & lanes;
+            const std::uint32_t met = agreeing(code);
             each(code, met);
             lanes &= ~met;
         }
-    }
-    static HWY_INLINE std::uint32_t lanes_of(std::size_t left) {
-        return static_cast<std::uint32_t>((std::uint64_t{1} << std::min(left, lanes16)) - 1);
     }
 
     /// `place_of` is where ray k of the job lies.
@@ -167,10 +174,12 @@ private:
                 hwy::Prefetch(rays + place_of(std::min(k + l + 128, last)));
             const auto codes = classify(read_rays(rays, index));
             hn::StoreU(hn::DemoteTo(Bytes(), codes), Bytes(), code_ + k);
-            for_each_code(codes, code_ + k, lanes_of(n - k),
-                          [&](std::uint8_t code, std::uint32_t lanes) {
-                              counts[code] += static_cast<std::uint32_t>(std::popcount(lanes));
-                          });
+            for_each_code(
+                codes, code_ + k, std::min(n - k, lanes16),
+                [&](std::uint8_t code, std::uint32_t lanes) {
+                    counts[code] += static_cast<std::uint32_t>(std::popcount(lanes));
+                },
+                [&](std::size_t l) { ++counts[code_[k + l]]; });
         }
         std::uint32_t at = 0, next[ray_class_count];
         for (std::uint32_t c = 0; c < ray_class_count; ++c) {
@@ -183,11 +192,13 @@ private:
             const auto places = hn::Load(I16(), index);
             const auto codes = hn::PromoteTo(I16(), hn::LoadU(Bytes(), code_ + k));
             for_each_code(
-                codes, code_ + k, lanes_of(n - k), [&](std::uint8_t code, std::uint32_t lanes) {
+                codes, code_ + k, std::min(n - k, lanes16),
+                [&](std::uint8_t code, std::uint32_t lanes) {
                     const auto mask = mask_of(I16(), lanes);
                     hn::StoreU(compress(I16(), places, mask, lanes), I16(), order_ + next[code]);
                     next[code] += static_cast<std::uint32_t>(std::popcount(lanes));
-                });
+                },
+                [&](std::size_t l) { order_[next[code_[k + l]]++] = index[l]; });
         }
         for (std::uint32_t c = 0; c < ray_class_count; ++c)  // the last ray again, to fill vectors
             if (counts[c] != 0) std::fill_n(order_ + next[c], lanes16, order_[next[c] - 1]);

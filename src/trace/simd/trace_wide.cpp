@@ -5,10 +5,10 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstring>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -460,29 +460,18 @@ namespace {
 /// Fewer rays are often a part of a picture, of which each part has a view of its own.
 constexpr std::size_t least_rays_of_view = 8192;
 
-/// Rounded down; far off all are one.
-std::uint32_t cell_of(float x) {
-    constexpr float most = 1000;
-    return static_cast<std::uint32_t>(static_cast<int>(std::floor(std::clamp(x, -most, most))));
-}
-/// BatchKind::view of rays like this one.
-std::uint32_t view_of(const Aabb& bounds, float longest_side, const Ray& ray) {
-    constexpr float places = 16, directions = 4;
-    constexpr float most = std::numeric_limits<float>::max();
-    if (!is_valid(ray) || !(longest_side > 0 && longest_side <= most)) return 0;
+/// Of a picture whose middle ray this one is; none if it cannot be told.
+std::optional<BatchView> seen_by(const Aabb& bounds, float longest_side, const Ray& ray) {
+    if (!is_valid(ray) || !(longest_side > 0)) return {};
     const float longest = longest_of(ray);
     const Vec3 from = ray.origin - bounds.lo, d = ray.direction;
-    std::uint32_t view = 1;
-    for (const float at : {from.x, from.y, from.z})
-        view = view * 61 + cell_of(at / longest_side * places);
-    for (const float along : {d.x, d.y, d.z})
-        view = view * 61 + cell_of(along / longest * directions);
-    return view == 0 ? 1 : view;
+    return BatchView{{from.x / longest_side, from.y / longest_side, from.z / longest_side},
+                     {d.x / longest, d.y / longest, d.z / longest}};
 }
 
 }  // namespace
 
-BatchLook look_at(const Aabb& bounds, std::span<const Ray> rays) {
+BatchLook look_at(const Aabb& bounds, std::span<const Ray> rays, std::size_t batch) {
     const FloatEnvironment plain;
     constexpr std::size_t largest_window = 64;
     const std::size_t window = std::min(largest_window, rays.size());
@@ -518,15 +507,16 @@ BatchLook look_at(const Aabb& bounds, std::span<const Ray> rays) {
         spread += beyond(angles, to);
     }
     BatchLook look{SimdPath::packet, {}, false};
-    look.kind.size = BatchKind::size_of(rays.size());
+    look.kind.size = BatchKind::size_of(batch);
     if (looked_at != 0) {
         look.kind.apart = static_cast<std::uint32_t>((apart + looked_at / 2) / looked_at);
         look.kind.spread = static_cast<std::uint32_t>((spread + looked_at / 2) / looked_at);
         look.scaled = 8 * odd >= window * looked_at;
         look.passing = 8 * passing >= put_to_bounds * looked_at;
     }
-    if (rays.size() >= least_rays_of_view && look.kind.apart == 0 && look.kind.spread == 0)
-        look.kind.view = view_of(bounds, longest_side, rays[rays.size() / 2]);
+    if (looked_at != 0 && batch >= least_rays_of_view && look.kind.apart == 0 &&
+        look.kind.spread == 0)
+        look.kind.view = seen_by(bounds, longest_side, rays[rays.size() / 2]);
     if (4 * coherent < 3 * looked_at)
         look.path = 2 * close >= looked_at ? SimdPath::stream : SimdPath::sorted;
     return look;

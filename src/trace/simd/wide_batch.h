@@ -26,7 +26,11 @@ struct BatchLook {
     bool scaled = false;   // many directions are far from unit length: scaled_rays.h
     bool passing = false;  // many rays pass the bounds by
 };
-[[nodiscard]] BatchLook look_at(const Aabb& bounds, std::span<const Ray> rays);
+/// `batch`: how many rays it has if `rays` are some of them.
+[[nodiscard]] BatchLook look_at(const Aabb& bounds, std::span<const Ray> rays, std::size_t batch);
+[[nodiscard]] inline BatchLook look_at(const Aabb& bounds, std::span<const Ray> rays) {
+    return look_at(bounds, rays, rays.size());
+}
 
 /// A batch of so many rays or fewer is one job, on the caller's thread.
 inline constexpr std::size_t undivided_rays = 1024;
