@@ -1,5 +1,8 @@
 #include "rays/place_order.h"
 
+#include <hwy/cache_control.h>
+
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <limits>
@@ -54,7 +57,11 @@ Buffer<std::uint32_t> order_along_curve(const Aabb& bounds, std::size_t n, const
 }  // namespace
 
 Buffer<std::uint32_t> order_by_place(const Aabb& bounds, std::span<const Ray> rays) {
-    return order_along_curve(bounds, rays.size(), [&](std::size_t i) { return rays[i].origin; });
+    return order_along_curve(bounds, rays.size(), [&](std::size_t i) {
+        constexpr std::size_t ahead = 32;
+        hwy::Prefetch(rays.data() + std::min(i + ahead, rays.size() - 1));
+        return rays[i].origin;
+    });
 }
 
 Buffer<std::uint32_t> order_by_place(const Aabb& bounds, std::span<const Vec3> points) {
