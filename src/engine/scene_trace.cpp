@@ -264,8 +264,8 @@ TraceCounts trace_batch(const Scene& scene, const Batch& batch) {
     check_options(batch.rays.size(), options);
     static_cast<void>(kernels_for(options.isa));
     if (const MeshTree* const mesh = visible_mesh(tree, options)) return trace_mesh(*mesh, batch);
-    return are_few(batch.rays.size(), options.path) ? trace_few(tree, batch)
-                                                    : trace_scene(tree, batch);
+    return are_few(tree.extent.box, batch.rays, options.path) ? trace_few(tree, batch)
+                                                              : trace_scene(tree, batch);
 }
 
 /// The order by triangles of the tree is that by geometry and triangle.

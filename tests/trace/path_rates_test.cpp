@@ -253,6 +253,27 @@ TEST(PathRates, OnlyBatchesFromOnePlaceInOneDirectionAreViews) {
     EXPECT_FALSE(look_at(bounds, apart).kind.view);
 }
 
+TEST(PathRates, FewRaysThatStartApartNeedNoPlan) {
+    const Aabb bounds{{0, 0, 0}, {2, 1, 1}};
+    const auto few = [&](std::size_t n, float step, SimdPath path = SimdPath::automatic) {
+        std::vector<Ray> rays;
+        for (std::size_t i = 0; i < n; ++i)
+            rays.push_back({{step * static_cast<float>(i), 0, 0}, 0, {0, 0, 1}});
+        return are_few(bounds, rays, path);
+    };
+    EXPECT_TRUE(few(0, 0));
+    EXPECT_TRUE(few(11, 0));
+    EXPECT_TRUE(few(11, 0, SimdPath::single));
+    EXPECT_FALSE(few(11, 1, SimdPath::packet));
+    EXPECT_FALSE(few(12, 0));
+    EXPECT_FALSE(few(12, 0.009f));
+    EXPECT_TRUE(few(12, 0.01f));
+    EXPECT_TRUE(few(31, 0.01f));
+    EXPECT_FALSE(few(32, 0.01f));
+    EXPECT_FALSE(few(31, 0.01f, SimdPath::single));
+    EXPECT_FALSE(few(31, std::numeric_limits<float>::quiet_NaN()));
+}
+
 TEST(PathRates, TimesFarOffEitherWayCancel) {
     // 0.77 in the geometric mean, 1.15 in the arithmetic one.
     for (const bool long_ones_first : {false, true}) {

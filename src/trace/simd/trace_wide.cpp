@@ -56,6 +56,8 @@ void (*job_of(const SimdKernels& kernels, PathWay way))(const SimdJob&, SimdCoun
     return way == PathWay::packets ? kernels.packets : kernels.streams;
 }
 
+/// Fewer rays are worth no trial of another way if one after the other is the way.
+constexpr std::size_t few_rays = 32;
 /// BatchKind::size from which on rays may stream: fewer have hardly two in a node.
 constexpr std::uint32_t least_size_to_stream = 2;
 
@@ -92,7 +94,7 @@ struct Plan {
           learns(automatic && !options.counters),
           streams(can_stream),
           counted(options.counters),
-          few(rays.size() < 32) {
+          few(rays.size() < few_rays) {
         if (automatic)
             look = look_at(tree.arrays().bounds, rays);
         else if (look.path != SimdPath::single && !counted && can_stream)
@@ -258,7 +260,7 @@ TraceCounts trace_few(const WideBvh& tree, std::span<const Ray> rays, HitRows hi
 TraceCounts trace_batch(const WideBvh& tree, std::span<const Ray> rays, HitRows hits,
                         std::uint8_t* occluded, const TraceOptions& options, const RowsDone& done,
                         const HitCheck* check) {
-    if (are_few(rays.size(), options.path) && !options.counters && check == nullptr)
+    if (are_few(tree.arrays().bounds, rays, options.path) && !options.counters && check == nullptr)
         return trace_few(tree, rays, hits, occluded, options, done);
     const Plan plan(tree, rays, options, !hits, check == nullptr);
     const SimdKernels& kernels = kernels_for(options.isa);
@@ -457,6 +459,9 @@ bool passes_by(const Aabb& box, const Ray& ray) {
 
 namespace {
 
+/// Of the longest side of the bounds: rays that start as close are neighbours.
+constexpr float small_part = 0.05f;
+
 /// Fewer rays are often a part of a picture, of which each part has a view of its own.
 constexpr std::size_t least_rays_of_view = 8192;
 
@@ -471,11 +476,25 @@ std::optional<BatchView> seen_by(const Aabb& bounds, float longest_side, const R
 
 }  // namespace
 
+bool are_few(const Aabb& bounds, std::span<const Ray> rays, SimdPath path) {
+    const std::size_t n = rays.size();
+    if (n >= few_rays || path != SimdPath::automatic || are_few(n, path)) return are_few(n, path);
+    const FloatEnvironment plain;
+    const Vec3 size = bounds.hi - bounds.lo;
+    const float far = small_part * max_of(max_of(size.x, size.y), size.z);
+    for (const std::size_t k : {n / 2, n - 1}) {
+        const Vec3 away = rays[k].origin - rays[0].origin;
+        if (max_of(max_of(std::fabs(away.x), std::fabs(away.y)), std::fabs(away.z)) > far)
+            return true;
+    }
+    return false;
+}
+
 BatchLook look_at(const Aabb& bounds, std::span<const Ray> rays, std::size_t batch) {
     const FloatEnvironment plain;
     constexpr std::size_t largest_window = 64;
     const std::size_t window = std::min(largest_window, rays.size());
-    constexpr float small_angle = 0.25f, wide_angle = 1.0f, small_part = 0.05f;
+    constexpr float small_angle = 0.25f, wide_angle = 1.0f;
     constexpr float parts[] = {0.002f, 0.01f, small_part}, angles[] = {small_angle, wide_angle};
     const Vec3 size = bounds.hi - bounds.lo;
     const float longest_side = max_of(max_of(size.x, size.y), size.z);

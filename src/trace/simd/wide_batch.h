@@ -37,8 +37,11 @@ inline constexpr std::size_t undivided_rays = 1024;
 
 /// Whether rays go one by one without a plan, which would cost them more than it gains.
 [[nodiscard]] inline bool are_few(std::size_t rays, SimdPath path) {
-    return rays < 8 && (path == SimdPath::automatic || path == SimdPath::single);
+    return rays < 12 && (path == SimdPath::automatic || path == SimdPath::single);
 }
+/// The same where the rays and what they go through are known: fewer than 32 that start apart would
+/// be sent one by one by a plan, too.
+[[nodiscard]] bool are_few(const Aabb& bounds, std::span<const Ray> rays, SimdPath path);
 
 /// Rays 0 to n - 1 as jobs of this path, on the threads of the calling context. Streams have as
 /// many in a job as give full vectors deep in the tree and still lie in the second-level cache;
