@@ -37,8 +37,10 @@ public:
         job_.limits.resize(job_.n);
         job_.invalid = 0;
         job_.single_stack.reserve_words(job_.tree->stack_size);
-        const bool alone = job_.single && all_ == nullptr;
-        alone ? one_by_one() : together();
+        if (job_.single && all_ == nullptr)
+            one_by_one();
+        else
+            together();
     }
 
 private:
