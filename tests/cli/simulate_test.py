@@ -15,6 +15,7 @@ from program import PROGRAM, SANITIZED, TRIANGLE, ProgramTest, main, ply, write_
 
 SCENE = "builtin:grove?triangles=10000" if SANITIZED else "builtin:grove?triangles=20000"
 SMALL = ("--size", "32x24", "--samples", "2") if SANITIZED else ("--size", "64x48", "--samples", "4")
+MEDIUM = ("--size", "40x30", "--launch-rays", "1024") if SANITIZED else ("--size", "128x96", "--launch-rays", "4096")
 KERNELS = {"packet", "while_while", "if_if", "speculative_while_while", "persistent_packet", "persistent_while_while",
            "persistent_if_if", "persistent_speculative_while_while", "ray_replacement", "work_queue", "dynamic_fetch"}
 KINDS = {"primary", "ao", "diffuse", "diffuse_shuffled"}
@@ -257,7 +258,8 @@ class Simulate(ProgramTest):
 
 class Traversal(ProgramTest):
     def test_tables(self):
-        arguments = ("bench", "traversal", SCENE, *SMALL, "--machine", "gtx285,gtx480")
+        size = ("--size", "16x12", "--samples", "2") if SANITIZED else SMALL
+        arguments = ("bench", "traversal", SCENE, *size, "--machine", "gtx285,gtx480")
         document = self.document(*arguments)
         rows = document["simulate"]
         self.assertEqual({r["machine"] for r in rows}, {"gtx285", "gtx480", "gtx285_enum_popc"})
@@ -401,8 +403,8 @@ class Traversal(ProgramTest):
         self.assertGreater(level, 0)
         self.assertIn("not told from: ", self.succeed(*arguments).out)
         # Of a part of the launches the error of the sample comes to that.
-        part = self.document("bench", "traversal", SCENE, "--size", "256x192", "--samples", "4", "--launch-rays", "8192", "--sample",
-                             "0.3", "--machine", small[1], "--rays", "ao", "--sweep-sample", "0")
+        size = ("--size", "96x72", "--launch-rays", "2048") if SANITIZED else ("--size", "256x192", "--launch-rays", "8192")
+        part = self.document("bench", "traversal", SCENE, *size, "--samples", "4", "--sample", "0.3", "--machine", small[1], "--rays", "ao", "--sweep-sample", "0")
         rows = {(r["rays"], r["kernel"], r["machine"]): r for r in part["simulate"]}
         ranked = next(r for r in part["ranking"] if (r["machine"], r["rays"]) == ("gtx480", "ao"))
         first, last = ranked["kernels"][0], ranked["kernels"][-1]
@@ -433,7 +435,7 @@ class Traversal(ProgramTest):
         self.assertGreater(len(claims), len(needing))
 
     def test_a_study_goes_on_where_it_ended(self):
-        arguments = ("bench", "traversal", SCENE, "--size", "128x96", "--samples", "8", "--launch-rays", "4096", "--machine",
+        arguments = ("bench", "traversal", SCENE, *MEDIUM, "--samples", "8", "--machine",
                      "gtx285,gtx480", "--kernel", "while_while,persistent_packet,dynamic_fetch", "--rays", "primary,diffuse",
                      "--sweep-sample", "0", "--quiet")
         whole = self.document(*arguments)
@@ -539,8 +541,8 @@ class Traversal(ProgramTest):
         refused({**sound, "parts": {name: {**part, "rows": 2 * part["rows"]}}}, "cannot be gone on with: 2 rows, not 1")
 
     def test_a_sample_is_corrected_by_all_launches(self):
-        arguments = ("bench", "traversal", SCENE, "--size", "128x96", "--samples", "8", "--launch-rays", "1024", "--machine",
-                     "gtx285,gtx480", "--kernel", "while_while,persistent_packet", "--rays", "diffuse", "--sweep-sample", "0",
+        arguments = ("bench", "traversal", SCENE, "--size", "64x48" if SANITIZED else "128x96", "--samples", "8", "--launch-rays",
+                     "1024", "--machine", "gtx285,gtx480", "--kernel", "while_while,persistent_packet", "--rays", "diffuse", "--sweep-sample", "0",
                      "--builder", "split", "--quiet")
         whole = self.document(*arguments)["simulate"]
         part = self.document(*arguments, "--error", "0.9")["simulate"]

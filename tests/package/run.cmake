@@ -69,7 +69,8 @@ if(NOT VARIANT STREQUAL "add_subdirectory")
 else()
     # What the consumer has no need of is left out, and nothing is quicker to compile than without optimisation.
     set(threads "oneTBB: no")
-    list(APPEND arguments -D RAYDIX_TBB=OFF -D RAYDIX_SOURCE_DIR=${RAYDIX_SOURCE_DIR} -D RAYDIX_CUDA=OFF -D RAYDIX_MPI=OFF -D CMAKE_BUILD_TYPE=Debug
+    list(APPEND arguments -D RAYDIX_TBB=OFF -D RAYDIX_SOURCE_DIR=${RAYDIX_SOURCE_DIR} -D RAYDIX_CUDA=OFF -D RAYDIX_OPENCL=OFF
+        -D RAYDIX_MPI=OFF -D CMAKE_BUILD_TYPE=Debug
         -D CMAKE_CXX_FLAGS_DEBUG=-O0 -D RAYDIX_INSTRUCTION_SETS=ONE
         "-DRAYDIX_SKIP=/src/(engine|gpu|image|io|measure|points|proximity|report|scene|simt)/|/src/trace/(simd|warp)/")
 endif()

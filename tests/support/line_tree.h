@@ -1,7 +1,7 @@
-// Brute force for large scenes: which triangles may a line meet? A median-split tree with bounds in
-// double and wide margins, walked along the whole line: no entry distance, no limit and no earlier
-// hit ever skips a node, so a fault of the library's culling cannot hide here. Every candidate goes
-// through the library's triangle test.
+// Brute force for large scenes: which triangles may a line meet? A median-split tree of eight
+// children a node with bounds in double and wide margins, walked along the whole line: no entry
+// distance, no limit and no earlier hit ever skips a node, so a fault of the library's culling
+// cannot hide here. Every candidate goes through the library's triangle test.
 #pragma once
 
 #include <raydix/bvh.h>
@@ -25,12 +25,13 @@ public:
     [[nodiscard]] std::vector<Hit> closest(std::span<const Ray> rays) const;
 
 private:
+    static constexpr int width = 8;
+    /// The boxes of up to eight children, by axis and child.
     struct Node {
-        double lo[3], hi[3];
-        std::uint32_t begin, end;  // range of ids_
-        std::uint32_t right;       // 0: a leaf; the left child follows its parent
+        double middle[3][width], half[3][width];  // of a child that is not there: -infinity
+        std::uint32_t child[width];               // a node, or is_triangle and a place in ids_
     };
-    std::uint32_t split(std::uint32_t begin, std::uint32_t end, std::span<const Vec3> centers);
+    void split(std::uint32_t self, std::span<std::uint32_t> ids, std::span<const Vec3> centers);
     template <class Visit>
     void visit_candidates(const Ray& ray, const Visit& visit) const;
 

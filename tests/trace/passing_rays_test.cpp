@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "support/sanitized.h"
 #include "support/scenes.h"
 #include "support/support.h"
 #include "trace/simd/wide_batch.h"
@@ -56,7 +57,8 @@ std::vector<Ray> rays_from_outside(const Aabb& box, std::size_t count, std::uint
 void expect_hits_of_brute_force(const std::string& name, const Mesh& mesh, std::uint64_t seed) {
     SCOPED_TRACE(name);
     const Scene scene(mesh);
-    const std::vector<Ray> rays = rays_from_outside(scene.bounds(), 2000, seed);
+    const std::size_t count = mesh.triangles.size() > 2000 ? fewer(2000, 5) : 2000;
+    const std::vector<Ray> rays = rays_from_outside(scene.bounds(), count, seed);
     const std::vector<Hit> wanted = trace_brute_force(mesh, rays);
     EXPECT_TRUE(look_at(scene.bounds(), rays).passing);
     const std::vector<Hit> hits = trace(scene, rays);

@@ -296,7 +296,7 @@ bool same(const Simulation& a, const Simulation& b) {
 TEST(Simulate, SharedBatchesCostWhatTheyCostAlone) {
     const Model scene = scene_of(random_soup(2000, 4, 0.1f), "soup");
     const WarpTree tree(build_bvh(scene.mesh()), true);
-    const std::vector<Ray> rays = make_mixed_rays(scene, 1500, 8);
+    const std::vector<Ray> rays = make_mixed_rays(scene, fewer(1500, 6), 8);
     std::vector<SimulateOptions> runs;
     for (const char* machine : {"gtx285", "h200"})
         for (const WarpKernel kernel : warp_kernels())

@@ -275,7 +275,7 @@ TEST(WarpOracle, AgreesWithEveryKernelOnTreesOfAllBuilders) {
     for (const Builder builder :
          {Builder::karras, Builder::lauterbach, Builder::garanzha, Builder::apetrei, Builder::ploc,
           Builder::hploc, Builder::binned, Builder::sweep, Builder::split, Builder::sbvh})
-        expect_hits_of_the_oracle(scene, builder, 400);
+        expect_hits_of_the_oracle(scene, builder, fewer(400, 3));
 }
 
 /// Every triangle twice, the second ones backwards: which of two is met first is up to the tree.
@@ -292,7 +292,7 @@ TEST(WarpOracle, AgreesWithEveryKernelOnSibenik) {
     if (!std::filesystem::exists(file)) GTEST_SKIP() << "needs the scene sibenik";
     const Model scene = load_model(file.string());
     for (const Builder builder : {Builder::split, Builder::sbvh})
-        expect_hits_of_the_oracle(scene, builder, fewer(100000, 50));
+        expect_hits_of_the_oracle(scene, builder, fewer(100000, 200));
 }
 
 TEST(WarpOracle, AgreesWithEveryKernelOnConference) {
@@ -300,7 +300,7 @@ TEST(WarpOracle, AgreesWithEveryKernelOnConference) {
     if (!std::filesystem::exists(file)) GTEST_SKIP() << "needs the scene conference";
     const Model scene = load_model(file.string());
     for (const Builder builder : {Builder::split, Builder::sbvh})
-        expect_hits_of_the_oracle(scene, builder, fewer(20000, 20));
+        expect_hits_of_the_oracle(scene, builder, fewer(20000, 50));
 }
 
 }  // namespace
