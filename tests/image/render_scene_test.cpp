@@ -65,7 +65,8 @@ TEST(RenderScene, OneMeshIsTheSamePictureAsItsTree) {
             const Scene scene(mesh, how);
             for (const View view : all_views) {
                 if (view == View::steps) continue;
-                RenderOptions options = options_for(view, 61, 37);
+                const RenderOptions options =
+                    test::sanitized ? options_for(view, 29, 19) : options_for(view, 61, 37);
                 EXPECT_TRUE(same_pixels(render(scene, camera_before_ball(), options),
                                         render(bvh, camera_before_ball(), options)))
                     << view_name(view) << " of " << mesh.triangles.size() << " triangles";

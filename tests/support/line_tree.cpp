@@ -44,7 +44,7 @@ RAYDIX_WIDE_CODE unsigned boxes_on(const double (&middle)[3][8], const double (&
         const double reach = rx > ry ? rx : ry, wide = margin * (reach > rz ? reach : rz);
         const double hx = half[0][k] + wide, hy = half[1][k] + wide, hz = half[2][k] + wide;
         // A child that is not there has -infinity or NaN here: neither is at least a distance.
-        met[k] = (hx * ay + hy * ax >= std::abs(x * d[1] - y * d[0])) &
+        met[k] = int(hx * ay + hy * ax >= std::abs(x * d[1] - y * d[0])) &
                  (hy * az + hz * ay >= std::abs(y * d[2] - z * d[1])) &
                  (hz * ax + hx * az >= std::abs(z * d[0] - x * d[2]));
     }

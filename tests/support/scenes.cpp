@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "base/math.h"
+#include "support/support.h"
 
 namespace raydix::test {
 
@@ -21,6 +22,15 @@ std::vector<Model> builtin_triangle_scenes(std::size_t triangles) {
         }
     }
     return scenes;
+}
+
+Model load_thinned(const std::filesystem::path& file, std::size_t most_if_slow) {
+    Model scene = load_model(file.string());
+    std::vector<Triangle>& all = scene.mesh().triangles;
+    const std::size_t step = thorough > 1 ? 1 : all.size() / most_if_slow + 1;
+    for (std::size_t k = 0; k * step < all.size(); ++k) all[k] = all[k * step];
+    all.resize((all.size() + step - 1) / step);
+    return scene;
 }
 
 Model scene_of(Mesh mesh, std::string name) {

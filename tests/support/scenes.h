@@ -4,6 +4,7 @@
 #include <raydix/model.h>
 
 #include <cstddef>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,10 @@ namespace raydix::test {
 
 /// One small version of each built-in scene of triangles.
 std::vector<Model> builtin_triangle_scenes(std::size_t triangles);
+
+/// The model of a file. Under sanitizers and on an emulated processor, where trees over millions of
+/// triangles take minutes, every n-th triangle of it, at most `most_if_slow`.
+Model load_thinned(const std::filesystem::path& file, std::size_t most_if_slow);
 
 /// A mesh without a file gets its name and one camera that sees it.
 Model scene_of(Mesh mesh, std::string name);

@@ -131,18 +131,10 @@ TEST(OracleHits, BuiltinScenesLikeEmbree) {
         expect_like_embree(scene, embree_rays);
 }
 
-/// A shared scene: Embree judges, and float brute force compares bit for bit. In full, but under
-/// the sanitizers, where trees over millions of triangles take minutes, a part of the triangles.
+/// A shared scene: Embree judges, and float brute force compares bit for bit.
 class SharedSceneHits : public testing::TestWithParam<const char*> {
 protected:
-    static Model load(const std::filesystem::path& file) {
-        Model scene = load_model(file.string());
-        std::vector<Triangle>& all = scene.mesh().triangles;
-        const std::size_t step = thorough > 1 ? 1 : all.size() / 100'000 + 1;
-        for (std::size_t k = 0; k * step < all.size(); ++k) all[k] = all[k * step];
-        all.resize((all.size() + step - 1) / step);
-        return scene;
-    }
+    static Model load(const std::filesystem::path& file) { return load_thinned(file, 100'000); }
 };
 
 TEST_P(SharedSceneHits, LikeEmbree) {

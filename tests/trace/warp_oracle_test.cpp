@@ -290,7 +290,7 @@ TEST(WarpOracle, TheLowerOfTwoEqualTrianglesWins) {
 TEST(WarpOracle, AgreesWithEveryKernelOnSibenik) {
     const std::filesystem::path file = shared_scene("sibenik/sibenik.ply.xz");
     if (!std::filesystem::exists(file)) GTEST_SKIP() << "needs the scene sibenik";
-    const Model scene = load_model(file.string());
+    const Model scene = load_thinned(file, 20'000);
     for (const Builder builder : {Builder::split, Builder::sbvh})
         expect_hits_of_the_oracle(scene, builder, fewer(100000, 200));
 }
@@ -298,7 +298,7 @@ TEST(WarpOracle, AgreesWithEveryKernelOnSibenik) {
 TEST(WarpOracle, AgreesWithEveryKernelOnConference) {
     const std::filesystem::path file = shared_scene("conference/conference.ply.xz");
     if (!std::filesystem::exists(file)) GTEST_SKIP() << "needs the scene conference";
-    const Model scene = load_model(file.string());
+    const Model scene = load_thinned(file, 20'000);
     for (const Builder builder : {Builder::split, Builder::sbvh})
         expect_hits_of_the_oracle(scene, builder, fewer(20000, 50));
 }
