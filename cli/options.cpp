@@ -135,18 +135,27 @@ void add_tree_options(CLI::App& command, TreeOptions& options) {
         options.of_a_bvh.push_back(command.get_option(name));
 }
 
+namespace {
+
+/// What the help says of an option, and the values that it names.
+void offer(CLI::App& command, const char* name, const char* what, const std::string& values) {
+    CLI::Option* option = command.get_option(name);
+    option->description(what);
+    option->get_validator(0)->description(values);
+}
+
+}  // namespace
+
+void offer_binary_layout(CLI::App& command) {
+    offer(command, "--layout", "Memory layout that is traced (default: binary)", "{binary}");
+    offer(command, "--device", "Where to build and trace", "{cpu}");
+}
+
 void offer_binary_tree(CLI::App& command, TreeOptions& options, const std::string& devices) {
-    const auto offer = [&](const char* name, const char* what, const std::string& values) {
-        CLI::Option* option = command.get_option(name);
-        option->description(what);
-        option->get_validator(0)->description(values);
-    };
-    offer("--tree", "Kind of tree", "{bvh}");
-    offer("--layout", "Memory layout that is traced (default: binary)", "{binary}");
-    if (devices.empty())
-        offer("--device", "Where to build and trace", "{cpu}");
-    else
-        offer("--device", "Where rays are also traced and timed (cpu: nowhere)", devices);
+    offer_binary_layout(command);
+    offer(command, "--tree", "Kind of tree", "{bvh}");
+    if (!devices.empty())
+        offer(command, "--device", "Where rays are also traced and timed (cpu: nowhere)", devices);
     CLI::Option* of_octrees = command.get_option("--max-level");
     std::erase(options.of_the_build, of_octrees);
     command.remove_option(of_octrees);

@@ -52,6 +52,9 @@ struct TreeOptions {
                                              const CommonOptions& common) const;
 };
 void add_tree_options(CLI::App& command, TreeOptions& options);
+/// For commands that take the binary layout on the cpu alone, after add_tree_options: their help
+/// offers no other.
+void offer_binary_layout(CLI::App& command);
 /// For commands that walk the binary tree alone, after add_tree_options: their help offers no value
 /// of --tree and --layout that they refuse, and as --device what `devices` says. "": the cpu.
 void offer_binary_tree(CLI::App& command, TreeOptions& options, const std::string& devices = "");

@@ -126,6 +126,7 @@ void add_render_command(CLI::App& app) {
                          "tree", "slice"});
     add_tree_view_options(*command, options->tree_view);
     add_tree_options(*command, options->tree);
+    offer_binary_layout(*command);
     add_flatten_option(*command, options->common);
     add_common_options(*command, options->common);
     command->callback([options] {

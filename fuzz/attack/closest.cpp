@@ -48,7 +48,7 @@ private:
             const auto alone = closest_points(tree, queries_, options_);
             for (std::size_t q = 0; q < queries_.size(); ++q) {
                 if (!alone[q].found()) continue;
-                const auto d2 = documented_d2(queries_[q], alone[q].position);
+                const auto d2 = distance_squared(queries_[q], alone[q].position);
                 if (expected_[q].found() && !(d2 < least[q])) continue;
                 least[q] = d2;
                 expected_[q] = alone[q];

@@ -44,7 +44,7 @@ static void attack_kdtrees(Case& c) {
         std::vector<KdNeighbor> wanted;
         if (is_finite(queries[q]))
             for (const std::uint32_t id : tree.order())
-                wanted.push_back({documented_d2(queries[q], points[id]), id});
+                wanted.push_back({distance_squared(queries[q], points[id]), id});
         std::sort(wanted.begin(), wanted.end(), [](const KdNeighbor& a, const KdNeighbor& b) {
             return a.d2 != b.d2 ? a.d2 < b.d2 : a.point < b.point;
         });

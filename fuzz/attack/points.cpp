@@ -29,18 +29,6 @@ Point point_from(Random& random, Vec3 p) {
         return {digits(p.x), digits(p.y), digits(p.z)};
 }
 
-/// Contract of all distances: in this order, no contraction.
-template <class Point>
-ScalarIn<Point> distance_squared(const Point& a, const Point& b) {
-    const auto dx = a.x - b.x, dy = a.y - b.y;
-    if constexpr (is_flat<Point>) {
-        return dx * dx + dy * dy;
-    } else {
-        const auto dz = a.z - b.z;
-        return (dx * dx + dy * dy) + dz * dz;
-    }
-}
-
 template <class Point>
 bool all_axes(const Point& a, const Point& b, bool (*holds)(double, double)) {
     bool all = holds(a.x, b.x) && holds(a.y, b.y);

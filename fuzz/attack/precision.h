@@ -120,11 +120,4 @@ inline bool same(const SweepHitD& a, const SweepHitD& b) {
 inline Vec3d as_double(Vec3 p) { return wide(p); }
 inline Vec3d as_double(Vec3d p) { return p; }
 
-/// As the documentation of the closest point has it.
-template <class Point>
-ScalarIn<Point> documented_d2(const Point& a, const Point& b) {
-    const auto dx = a.x - b.x, dy = a.y - b.y, dz = a.z - b.z;
-    return (dx * dx + dy * dy) + dz * dz;
-}
-
 }  // namespace raydix::attack

@@ -84,7 +84,7 @@ private:
             for (std::size_t q = 0; q < spheres.size(); ++q) {
                 const auto radius = spheres[q].radius;
                 if (alone[q].found() && radius >= 0 && std::isfinite(radius) &&
-                    documented_d2(centers[q], alone[q].position) <= radius * radius)
+                    distance_squared(centers[q], alone[q].position) <= radius * radius)
                     lists[q].push_back(triangle);
             }
         });

@@ -54,4 +54,17 @@ inline Vec3 narrow(Vec3d v) {
     return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
 }
 
+/// Of points in space or in a plane, as the documentation of distances has it: in this order, no
+/// contraction.
+template <class P>
+ScalarIn<P> distance_squared(const P& a, const P& b) {
+    const auto dx = a.x - b.x, dy = a.y - b.y;
+    if constexpr (requires { a.z; }) {
+        const auto dz = a.z - b.z;
+        return (dx * dx + dy * dy) + dz * dz;
+    } else {
+        return dx * dx + dy * dy;
+    }
+}
+
 }  // namespace raydix::attack

@@ -111,6 +111,12 @@ class HelpPages(ProgramTest):
         self.assertRegex(text, r"Builder \(default.*sbvh for gtx480")
         self.assertEqual(self.complete("raydix", "simulate", "x.ply", "--tree", ""), {"bvh"})
 
+    def test_help_of_render_offers_no_layout_that_is_refused(self):
+        text = self.succeed("render", "--help").out
+        self.assertIn("octree", text)
+        for refused in ("wide8", "cwbvh", "cuda", "|sim"):
+            self.assertNotIn(refused, text)
+
     def test_all_pages_into_a_folder(self):
         (self.folder / "pages").mkdir()
         self.succeed("man", "--folder", "pages")
