@@ -135,7 +135,7 @@ const std::vector<Case>& cases() {
         {"moving, high", {.quality = Quality::high, .usage = Usage::moving}, 2000, 12},
         {"moving, fast", {.quality = Quality::fast, .usage = Usage::moving}, 2000, 8},
         {"moving, never refitted", {.usage = Usage::moving, .refit_limit = 0}, 2000, 12},
-        {"fixed, large", {}, 40000, 60},
+        {"fixed, large", {}, test::fewer(40000, 2), test::fewer(60, 2)},
         {"fixed, high, large", {.quality = Quality::high}, test::fewer(20000, 2), 15},
         {"fixed, fast, large", {.quality = Quality::fast}, test::fewer(100000, 2), 20},
     };
