@@ -104,7 +104,7 @@ TraceCounts trace_scene(const SceneTree& tree, const Batch& batch) {
     with_threads(batch.options.threads, [&] {
         Buffer<std::uint32_t> order;
         if (sorted) order = order_by_place(tree.extent.box, batch.rays);
-        const JobBlocks jobs = jobs_of(n, SimdPath::stream);
+        const JobBlocks jobs = jobs_of(n, JobSize::medium);
         parts.resize(jobs.count());
         jobs.run([&](std::size_t job, std::size_t begin, std::size_t end) {
             plan.ways.run(begin, end, [&](PathWay way, std::size_t from, std::size_t to) {

@@ -96,7 +96,7 @@ public:
         else if (!automatic_)
             trace(RayOrder::sorted, 0, n);
         else
-            run_in_better_order(tree_.rates.orders(look_.kind), n, trace);
+            run_in_better_order(tree_.rates.orders(look_.kind), look_.kind, n, trace);
     }
 
     /// Of jobs in this order.
@@ -175,7 +175,7 @@ TraceCounts trace_batch(const SceneD& scene, const Batch& batch) {
             if (ray_order == RayOrder::sorted)
                 order = order_by_place(*tree.only_mesh()->tree, part.rays);
             const JobWays ways = plan.ways(ray_order);
-            const JobBlocks blocks = jobs_of(part.rays.size(), SimdPath::packet);
+            const JobBlocks blocks = jobs_of(part.rays.size(), JobSize::small);
             std::vector<JobCounts> counts(blocks.count());
             blocks.run([&](std::size_t number, std::size_t begin, std::size_t end) {
                 ways.run(begin, end, [&](PathWay way, std::size_t from, std::size_t to) {

@@ -23,6 +23,10 @@ enum class PathWay : std::uint8_t { packets, streams, turns, alone };
 /// In which order: as the caller has them, or by where they start.
 enum class RayOrder : std::uint8_t { given, sorted };
 
+/// Ways that are slow with a small part of a job's rays, however fast they are with all of them.
+constexpr bool needs_many(PathWay way) { return way == PathWay::streams; }
+constexpr bool needs_many(RayOrder) { return false; }
+
 /// Of a batch from about one place in about one direction, as a picture is.
 struct BatchView {
     // Where its middle ray starts, in longest sides of the scene, and where to, the longest 1.
@@ -48,10 +52,10 @@ public:
     /// more than four, in the order of promise. Most jobs go the fastest way known. In a trial some
     /// rays go another way, and both are timed side by side: what rays take differs from place to
     /// place. These are at least `least_share` rays, enough to tell, or an eighth; half of the job
-    /// once a way has been tried twice and takes less than twice the time. A job of fewer than
-    /// 2 * least_share tries one way at most, every fourth one if a way is due, with a quarter of
-    /// its rays, or half if that way is not much slower. A job of fewer than 128 rays goes the
-    /// other way as a whole, and the next one is timed beside it.
+    /// if it is large and needs_many(way), or once it has been tried twice and takes less than
+    /// twice the time. A job of fewer than 2 * least_share tries one way at most, every fourth one
+    /// if a way is due, with a quarter of its rays, or half if that way is not much slower. A job
+    /// of fewer than 128 rays goes the other way as a whole, and the next one is timed beside it.
     template <class Trace>
     void run(std::span<const Way> ways, std::size_t begin, std::size_t end, const Trace& trace,
              std::size_t least_share = 256) {
@@ -135,6 +139,7 @@ private:
     /// Of jobs that go another way as a whole: rays of one that is asked once should not suffer.
     static constexpr std::uint32_t whole_pause = 4;
     static constexpr std::size_t least_to_divide = 128;
+    static constexpr std::size_t least_of_many = 2048;
 
     static std::size_t index(Way way) { return static_cast<std::size_t>(way); }
     [[nodiscard]] float cost(Way way) const {
@@ -226,7 +231,8 @@ private:
         std::size_t count = 0;
         if (may_try && !small)
             for (const Way way : ways)
-                if (way != best && !is_proven(way) && is_due(way, job)) tried[count++] = way;
+                if (way != best && !is_proven(way) && is_due(way, job) && !needs_many(way))
+                    tried[count++] = way;
         if (may_try && count == 0)
             if (const auto way = longest_due(ways, best, job)) tried[count++] = *way;
         if (count == 0) {
@@ -236,7 +242,9 @@ private:
         // The fewer rays packets and streams get, the more each of them takes: a way that is not
         // much slower by a small share gets half of the job.
         const float half_below = is_proven(tried[0]) && !small ? 2.0f : near_cost;
-        const bool half = count == 1 && known(tried[0]) && cost(tried[0]) < half_below * cost(best);
+        const bool half =
+            count == 1 && ((needs_many(tried[0]) && rays >= least_of_many) ||
+                           (known(tried[0]) && cost(tried[0]) < half_below * cost(best)));
         const std::size_t share =
             half    ? rays / 2
             : small ? rays / 4
@@ -301,14 +309,15 @@ private:
 /// What a batch is like, as far as a few of its rays tell.
 struct BatchKind {
     bool any = false, sorted = false;
-    std::uint32_t apart = 0;   // where rays start that follow each other: 0 close together to 3
+    std::uint32_t apart = 0;   // where rays start that follow each other: 0 close to anywhere
     std::uint32_t spread = 0;  // of their directions: 0 to 2
     std::uint32_t size = 0;    // of the batch: 0 to 4
     std::optional<BatchView> view{};  // of pictures; it has no part in the index
 
-    static constexpr std::size_t count = 2 * 2 * 4 * 3 * 5;
+    static constexpr std::uint32_t anywhere = 4;
+    static constexpr std::size_t count = 2 * 2 * (anywhere + 1) * 3 * 5;
     [[nodiscard]] std::size_t index() const {
-        return (((std::size_t{any} * 2 + sorted) * 4 + apart) * 3 + spread) * 5 + size;
+        return (((std::size_t{any} * 2 + sorted) * (anywhere + 1) + apart) * 3 + spread) * 5 + size;
     }
     static std::uint32_t size_of(std::size_t rays) {
         std::uint32_t size = 0;

@@ -12,13 +12,16 @@ namespace raydix {
 inline constexpr std::size_t least_rays_to_sort = 16384;
 
 /// Rays 0 to n - 1, least_rays_to_sort or more, by trace(order, begin, end). Batches that are alike
-/// try both orders and go on with the faster one; large ones begin with sorted rays. In a trial
-/// each order has half of the rays: of a smaller part more threads would wait for the last job.
+/// try both orders and go on with the faster one; large ones whose rays start anywhere begin with
+/// sorted rays. In a trial each order has half of the rays: of a smaller part more threads would
+/// wait for the last job.
 template <class Trace>
-void run_in_better_order(OrderRates& rates, std::size_t n, const Trace& trace) {
+void run_in_better_order(OrderRates& rates, const BatchKind& kind, std::size_t n,
+                         const Trace& trace) {
     constexpr std::size_t many = 65536;
+    const bool sorted_first = n >= many && kind.apart == BatchKind::anywhere;
     constexpr RayOrder orders[] = {RayOrder::given, RayOrder::sorted, RayOrder::given};
-    rates.run(std::span(orders).subspan(n < many ? 0 : 1, 2), 0, n, trace, n / 2);
+    rates.run(std::span(orders).subspan(sorted_first ? 1 : 0, 2), 0, n, trace, n / 2);
 }
 
 }  // namespace raydix

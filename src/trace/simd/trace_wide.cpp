@@ -39,12 +39,13 @@ const SimdKernels& kernels_for(const std::string& isa) {
     throw InputError("instruction set " + isa + ": this processor and build have " + known);
 }
 
-JobBlocks jobs_of(std::size_t n, SimdPath path, bool counted) {
-    constexpr std::size_t unit = 512, usual = 1024, jobs = 32;
-    const bool streams = path == SimdPath::stream || path == SimdPath::sorted;
-    // Jobs are also what ways are tried on: so many that a batch learns from its own first ones.
-    const std::size_t largest =
-        streams ? std::clamp(n / jobs / usual * usual, usual, max_job_rays) : usual;
+JobBlocks jobs_of(std::size_t n, JobSize size, bool counted) {
+    constexpr std::size_t unit = 512, usual = 1024;
+    std::size_t largest = usual;
+    if (size != JobSize::small) {
+        const std::size_t jobs = size == JobSize::medium ? 32 : 4;
+        largest = std::clamp(n / jobs / usual * usual, usual, max_job_rays);
+    }
     if (counted || n <= undivided_rays) return JobBlocks::fixed(n, largest);
     return JobBlocks::guided(n, unit, largest, static_cast<std::size_t>(thread_count()));
 }
@@ -60,6 +61,8 @@ void (*job_of(const SimdKernels& kernels, PathWay way))(const SimdJob&, SimdCoun
 constexpr std::size_t few_rays = 32;
 /// BatchKind::size from which on rays may stream: fewer have hardly two in a node.
 constexpr std::uint32_t least_size_to_stream = 2;
+/// The same of rays that start apart and are not sorted: from here on streams are tried first.
+constexpr std::uint32_t least_size_to_stream_apart = 3;
 
 PathWay way_of(SimdPath path) {
     if (path == SimdPath::single) return PathWay::turns;
@@ -106,7 +109,10 @@ struct Plan {
 
     /// On the threads of the calling context.
     [[nodiscard]] JobBlocks jobs(std::size_t rays) const {
-        return jobs_of(rays, streams ? look.path : SimdPath::packet, counted);
+        const bool may_stream =
+            streams && (look.path == SimdPath::stream || look.path == SimdPath::sorted);
+        if (!may_stream) return jobs_of(rays, JobSize::small, counted);
+        return jobs_of(rays, counted ? JobSize::medium : JobSize::large, counted);
     }
 
     /// Rays 0 to n - 1 by trace(order, begin, end).
@@ -119,14 +125,15 @@ struct Plan {
         } else if (!learns) {
             trace(RayOrder::sorted, 0, n);
         } else {
-            run_in_better_order(tree.arrays().rates.orders(look.kind), n, trace);
+            run_in_better_order(tree.arrays().rates.orders(look.kind), look.kind, n, trace);
         }
     }
 
     /// Of jobs in this order.
     [[nodiscard]] JobWays ways(RayOrder order) const {
         const bool apart = look.path == SimdPath::sorted && order == RayOrder::given;
-        PathWay first = apart ? PathWay::turns : way_of(look.path);
+        const bool many = look.kind.size >= least_size_to_stream_apart;
+        PathWay first = apart && !many ? PathWay::turns : way_of(look.path);
         // Rays from one place are often those of a coarse picture, which packets suit.
         if (!streams && first == PathWay::streams)
             first = automatic ? PathWay::packets : PathWay::turns;
@@ -495,7 +502,8 @@ BatchLook look_at(const Aabb& bounds, std::span<const Ray> rays, std::size_t bat
     constexpr std::size_t largest_window = 64;
     const std::size_t window = std::min(largest_window, rays.size());
     constexpr float small_angle = 0.25f, wide_angle = 1.0f;
-    constexpr float parts[] = {0.002f, 0.01f, small_part}, angles[] = {small_angle, wide_angle};
+    constexpr float parts[] = {0.002f, 0.01f, small_part, 0.3f},
+                    angles[] = {small_angle, wide_angle};
     const Vec3 size = bounds.hi - bounds.lo;
     const float longest_side = max_of(max_of(size.x, size.y), size.z);
     const std::size_t windows = std::clamp<std::size_t>(rays.size() / 256, 1, 32);

@@ -43,11 +43,18 @@ inline constexpr std::size_t undivided_rays = 1024;
 /// be sent one by one by a plan, too.
 [[nodiscard]] bool are_few(const Aabb& bounds, std::span<const Ray> rays, SimdPath path);
 
-/// Rays 0 to n - 1 as jobs of this path, on the threads of the calling context. Streams have as
-/// many in a job as give full vectors deep in the tree and still lie in the second-level cache;
-/// fewer where the batch would not keep all threads busy. `counted`: visits are, so that jobs may
-/// depend on the batch alone.
-[[nodiscard]] JobBlocks jobs_of(std::size_t n, SimdPath path, bool counted = false);
+/// How many rays a job has. Streams have as many in a job as give full vectors deep in the tree and
+/// still lie in the second-level cache. Jobs are also what ways are tried on.
+enum class JobSize : std::uint8_t {
+    small,   // 1,024
+    medium,  // a 32nd of the batch: it learns from its own first ones. At least as many as that
+    large,   // a quarter, likewise: what streams need
+};
+
+/// Rays 0 to n - 1 as jobs, on the threads of the calling context; smaller ones where the batch
+/// would not keep all threads busy. `counted`: visits are, so that jobs may depend on the batch
+/// alone.
+[[nodiscard]] JobBlocks jobs_of(std::size_t n, JobSize size, bool counted = false);
 
 /// Stacks for the deepest path of a tree.
 class StackMemory {
