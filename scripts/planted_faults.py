@@ -370,7 +370,7 @@ FAULTS = [
           "memory that nobody holds any more serves nothing", "exec layout"),
     Fault("src/exec/path_rates.h", "void share(const PathRates& other) { known_ = other.known_; }",
           "void share(const PathRates&) {}", "rates: a new frame knows nothing of the last one", "trace"),
-    Fault("src/exec/path_rates.h", "count == 1 && known(tried[0]) && cost(tried[0]) < half_below * cost(best);",
+    Fault("src/exec/path_rates.h", "(known(tried[0]) && cost(tried[0]) < half_below * cost(best))",
           "false;", "rates: ways that need many rays are judged by few", "trace"),
     Fault("src/exec/path_rates.h", "std::min(least_pause << trials, longest_pause);",
           "longest_pause;", "rates: one of the first trials rests a way for long", "trace"),
