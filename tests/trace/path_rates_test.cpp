@@ -12,12 +12,14 @@
 #include <cstdint>
 #include <cstring>
 #include <limits>
+#include <optional>
 #include <random>
 #include <span>
 #include <thread>
 #include <vector>
 
 #include "support/support.h"
+#include "trace/simd/ray_order.h"
 #include "trace/simd/wide_batch.h"
 
 namespace raydix::test {
@@ -118,6 +120,34 @@ TEST(PathRates, AWayThatNeedsManyRaysIsNotJudgedByFew) {
     }
     EXPECT_GE(last, 512u);
     EXPECT_EQ(rates.fastest(two), PathWay::packets);
+}
+
+TEST(PathRates, StreamsAreTriedOnHalfOfALargeJobHoweverSlow) {
+    Rates rates;
+    std::size_t trials = 0;
+    for (int job = 0; job < 200; ++job)
+        for (const Share& share : shares_of(rates, three_ways, 8192, {100, 500, 200, 100})) {
+            if (share.way != PathWay::streams) continue;
+            EXPECT_EQ(share.end - share.begin, 4096u) << job;
+            ++trials;
+        }
+    EXPECT_GE(trials, 3u);
+}
+
+TEST(PathRates, OrdersOfLargeBatchesBeginAsNeighboursStart) {
+    const auto first_order = [](std::uint32_t apart, std::size_t n) {
+        OrderRates rates;
+        BatchKind kind;
+        kind.apart = apart;
+        std::optional<RayOrder> first;
+        run_in_better_order(rates, kind, n, [&](RayOrder order, std::size_t, std::size_t) {
+            if (!first) first = order;
+        });
+        return *first;
+    };
+    EXPECT_EQ(first_order(BatchKind::anywhere, 65'536), RayOrder::sorted);
+    EXPECT_EQ(first_order(BatchKind::anywhere, 65'535), RayOrder::given);
+    EXPECT_EQ(first_order(BatchKind::anywhere - 1, 1'000'000), RayOrder::given);
 }
 
 TEST(PathRates, ASmallJobTriesAnotherWayOnAQuarterOfItsRays) {
