@@ -1,4 +1,5 @@
-// How many lanes of each kernel the machines hold, worked out by hand, and what follows from it.
+// How many lanes of each kernel the machines hold, worked out by hand, and what follows from it;
+// how long a block keeps its place.
 #include "trace/warp/residency.h"
 
 #include <gtest/gtest.h>
@@ -48,6 +49,37 @@ TEST(Residency, WhatBlocksShareIsTakenFromL1) {
     EXPECT_EQ(held("gtx480", WarpKernel::while_while).l1_bytes, 48u * 1024);
     EXPECT_EQ(held("h200", WarpKernel::work_queue).l1_bytes, 262'144u - 896 * 116);
     EXPECT_EQ(held("gtx285", WarpKernel::work_queue).l1_bytes, 0u);
+}
+
+TEST(Residency, ABlockKeepsItsPlaceUntilItsLastWarpIsDone) {
+    Mesh two_triangles;
+    two_triangles.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {10, 0, 0}, {11, 0, 0}, {10, 1, 0}};
+    two_triangles.triangles = {{0, 1, 2}, {3, 4, 5}};
+    const WarpTree tree(build_bvh(two_triangles, {.max_leaf = 1}));
+    SimulateOptions options{.kernel = WarpKernel::while_while, .machine = machine_model("gtx480")};
+    options.machine.multiprocessors = 1;
+    options.machine.lanes_per_clock = 32;
+    options.machine.warp_issue_clocks = 2;  // two warps fill the machine
+    options.machine.read_clocks = 0;
+    options.machine.block_lanes = options.machine.resident_lanes = 64;
+    const auto clocks = [&](const std::vector<Ray>& rays) {
+        return simulate(tree, rays, std::span(&options, 1)).front();
+    };
+    const std::vector<Ray> hitting(32, Ray{{0.25f, 0.25f, 5}, 0, {0, 0, -1}, infinity}),
+        missing(32, Ray{{5, 5, 5}, 0, {0, 0, -1}, infinity});
+    const double longer = clocks(hitting).scheduled_clocks,
+                 shorter = clocks(missing).scheduled_clocks;
+    EXPECT_GT(longer, shorter + 10);
+    std::vector<Ray> rays;
+    for (int block = 0; block < 3; ++block) {
+        rays.insert(rays.end(), hitting.begin(), hitting.end());
+        rays.insert(rays.end(), missing.begin(), missing.end());
+    }
+    const Simulation all = clocks(rays);
+    EXPECT_NEAR(all.scheduled_clocks, 3 * longer, 1e-6);
+    // After the last block went out at 2 * longer, one slot in two is empty once its shorter warp
+    // ends.
+    EXPECT_NEAR(all.idle_issues, (longer - shorter) / 2, 1e-6);
 }
 
 TEST(Residency, WorkQueuesAreScheduledWithTheWarpsThatFit) {

@@ -189,33 +189,6 @@ TEST(Simulate, OneLaneHasFullEfficiencyAndWidthsAgree) {
     }
 }
 
-TEST(Simulate, ABlockKeepsItsPlaceUntilItsLastWarpIsDone) {
-    const WarpTree tree(build_bvh(two_triangles(), {.max_leaf = 1}));
-    SimulateOptions options = options_for(WarpKernel::while_while);
-    options.machine.multiprocessors = 1;
-    options.machine.lanes_per_clock = 32;
-    options.machine.warp_issue_clocks = 2;  // two warps fill the machine
-    options.machine.read_clocks = 0;
-    options.machine.block_lanes = options.machine.resident_lanes = 64;
-    const auto clocks = [&](const std::vector<Ray>& rays) {
-        return simulate(tree, rays, std::span(&options, 1)).front();
-    };
-    const std::vector<Ray> hitting(32, down(0.25f, 0.25f)), missing(32, down(5, 5));
-    const double longer = clocks(hitting).scheduled_clocks,
-                 shorter = clocks(missing).scheduled_clocks;
-    EXPECT_GT(longer, shorter + 10);
-    std::vector<Ray> rays;
-    for (int block = 0; block < 3; ++block) {
-        rays.insert(rays.end(), hitting.begin(), hitting.end());
-        rays.insert(rays.end(), missing.begin(), missing.end());
-    }
-    const Simulation all = clocks(rays);
-    EXPECT_NEAR(all.scheduled_clocks, 3 * longer, 1e-6);
-    // After the last block went out at 2 * longer, one slot in two is empty once its shorter warp
-    // ends.
-    EXPECT_NEAR(all.idle_issues, (longer - shorter) / 2, 1e-6);
-}
-
 /// Instructions of one warp in which all rays hit, or all miss.
 double warp_instructions(const WarpTree& tree, SimulateOptions options, Ray ray) {
     const std::vector<Ray> rays(32, ray);
