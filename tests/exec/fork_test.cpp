@@ -11,6 +11,7 @@
 
 #include "exec/parallel.h"
 #include "support/double_scenes.h"
+#include "support/sanitized.h"
 
 namespace raydix::test {
 namespace {
@@ -79,12 +80,8 @@ TEST(Fork, WhileOtherThreadsEnterAndLeaveLoops) {
 
 /// What queries of distance keep of a scene in double is made by the first of them.
 TEST(Fork, WhileTheFirstDistanceToASceneInDoubleIsAsked) {
-#ifdef __SANITIZE_THREAD__
-    GTEST_SKIP() << "the sanitizer's pthread_once does not know of fork, glibc's does";
-#endif
-#ifdef __SANITIZE_ADDRESS__
-    GTEST_SKIP() << "the sanitizer's memory may stay locked in the child, glibc's does not";
-#endif
+    if (sanitized)
+        GTEST_SKIP() << "glibc's memory and pthread_once know of fork, those of sanitizers do not";
     const MeshD mesh = random_soup_d(60'000, 4, 0.1);
     for (int k = 0; k < 4; ++k) {
         SceneD scene;
