@@ -51,24 +51,33 @@ public:
     /// Rays begin to end - 1 of a job, by trace(way, begin, end). `ways`: those that there are, not
     /// more than four, in the order of promise. Most jobs go the fastest way known. In a trial some
     /// rays go another way, and both are timed side by side: what rays take differs from place to
-    /// place. These are at least `least_share` rays, enough to tell, or an eighth; half of the job
-    /// if it is large and needs_many(way), or once it has been tried twice and takes less than
-    /// twice the time. A job of fewer than 2 * least_share tries one way at most, every fourth one
-    /// if a way is due, with a quarter of its rays, or half if that way is not much slower. A job
-    /// of fewer than 128 rays goes the other way as a whole, and the next one is timed beside it.
+    /// place. These are at least 256 rays, enough to tell, or an eighth; half of the job if it is
+    /// large and needs_many(way), or once it has been tried twice and takes less than twice the
+    /// time. A job of fewer than 512 tries one way at most, every fourth one if a way is due, with
+    /// a quarter of its rays, or half if that way is not much slower. A job of fewer than 128 rays
+    /// goes the other way as a whole, and the next one is timed beside it.
     template <class Trace>
-    void run(std::span<const Way> ways, std::size_t begin, std::size_t end, const Trace& trace,
-             std::size_t least_share = 256) {
+    void run(std::span<const Way> ways, std::size_t begin, std::size_t end, const Trace& trace) {
         const std::uint32_t job = jobs_.fetch_add(1, std::memory_order_relaxed);
         const Way best = fastest(ways);
         const std::size_t rays = end - begin;
         if (ways.size() < 2 || rays == 0) {
             if (rays != 0) trace(best, begin, end);
         } else if (rays < least_to_divide) {
-            run_whole(ways, best, job, begin, end, trace);
+            run_whole(ways, best, job, begin, end, trace, job % whole_pause == whole_pause - 1,
+                      whole_pause);
         } else {
-            run_divided(ways, best, job, begin, end, trace, least_share);
+            run_divided(ways, best, job, begin, end, trace);
         }
+    }
+
+    /// The same of a job that goes one way as a whole, since ways suit many rays. In a trial the
+    /// next job is timed beside it.
+    template <class Trace>
+    void run_undivided(std::span<const Way> ways, std::size_t begin, std::size_t end,
+                       const Trace& trace) {
+        const std::uint32_t job = jobs_.fetch_add(1, std::memory_order_relaxed);
+        run_whole(ways, fastest(ways), job, begin, end, trace, job > 0, 1);
     }
 
     /// The first one where nothing is known yet.
@@ -86,19 +95,28 @@ public:
         if (!(ratio > 0.0f) || adding_.test_and_set(std::memory_order_acquire)) return;
         if (!known(other)) set(other, 1.0f);
         const float now = cost(other) * std::clamp(ratio, 1 / most_at_once, most_at_once);
+        const bool led = known(way) && cost(way) < cost(other);
         const std::uint8_t trials = trials_of(way);
         // Of many the geometric mean: single ones are often far off, either way. The first one
         // finds memory as it was, and counts little once there is another.
         if (trials == 0) {
             set(way, now);
         } else {
-            const float weight = trials == 1 ? 0.67f : std::max(1.0f / trials, 0.2f);
+            const float weight = trials == 1 ? 0.67f : std::max(1.0f / trials, 0.1f);
             const float change = std::clamp(now / cost(way), 1 / most_change, most_change);
             set(way, cost(way) * std::pow(change, weight));
         }
         if (trials < most_trials) set_trials(way, trials + 1);
-        // It may have lost by chance: then it is not to rest for long.
-        if (cost(way) < cost(other)) set_trials(other, std::min(trials_of(other), often_tried));
+        if (const float won = cost(way) / cost(other); won < 1.0f) {
+            // It may have lost by chance: then it is not to rest for long.
+            set_trials(other, std::min(trials_of(other), often_tried));
+            // Nor are the rest to seem the slower whenever another one leads.
+            for (std::size_t k = 0; k < way_count && !led; ++k)
+                if (k != index(way) && k != index(other)) {
+                    const Way third = static_cast<Way>(k);
+                    set(third, cost(third) * won);
+                }
+        }
         keep_in_range();
         adding_.clear(std::memory_order_release);
     }
@@ -135,11 +153,11 @@ private:
     static constexpr float most_at_once = 16.0f, near_cost = 1.2f, most_change = 4.0f;
     static constexpr float least_cost = 0x1p-10f;
     static constexpr std::uint32_t least_pause = 8, longest_pause = 1024;
-    static constexpr std::uint8_t often_tried = 4, most_trials = 8;  // that are told apart
+    static constexpr std::uint8_t often_tried = 4, most_trials = 10;  // that are told apart
     /// Of jobs that go another way as a whole: rays of one that is asked once should not suffer.
     static constexpr std::uint32_t whole_pause = 4;
     static constexpr std::size_t least_to_divide = 128;
-    static constexpr std::size_t least_of_many = 2048;
+    static constexpr std::size_t least_share = 256, least_of_many = 2048;
 
     static std::size_t index(Way way) { return static_cast<std::size_t>(way); }
     [[nodiscard]] float cost(Way way) const {
@@ -199,12 +217,14 @@ private:
             const std::uint8_t trials = trials_of(way);
             const float ratio = std::max(cost(way) / cost(best), 1.0f);
             const bool often = trials > often_tried && ratio >= near_cost;
-            const std::uint32_t longer = often ? 1u << (trials - often_tried) : 1;
+            const std::uint32_t longer = often ? 1u << std::min(trials - often_tried, 4) : 1;
             // Few trials may all be wrong.
             const std::uint32_t longest = std::min(least_pause << trials, longest_pause);
             jobs = static_cast<std::uint32_t>(
                 std::min(static_cast<float>(least_pause * longer) * ratio * ratio,
                          static_cast<float>(longest)));
+            // Not always the same job of batches that have a few.
+            jobs += job * 0x9E3779B9u >> 30;
         }
         due_[index(way)].store(job + jobs, std::memory_order_relaxed);
     }
@@ -222,7 +242,7 @@ private:
 
     template <class Trace>
     void run_divided(std::span<const Way> ways, Way best, std::uint32_t job, std::size_t begin,
-                     std::size_t end, const Trace& trace, std::size_t least_share) {
+                     std::size_t end, const Trace& trace) {
         const std::size_t rays = end - begin;
         const bool small = rays < 2 * least_share;
         // The first job finds memory as it was.
@@ -245,27 +265,50 @@ private:
         const bool half =
             count == 1 && ((needs_many(tried[0]) && rays >= least_of_many) ||
                            (known(tried[0]) && cost(tried[0]) < half_below * cost(best)));
+        const bool odd = rounds_[index(tried[0])].fetch_add(1, std::memory_order_relaxed) % 2 != 0;
+        // What rays take often rises or falls from one end of a batch to the other, as in a picture
+        // from the sky to the ground: one way lies around the other, if that leaves it enough.
+        const bool large = rays >= 2 * least_of_many;
+        if (half && large) {
+            try_half(tried[0], best, odd, begin, end, trace);
+            pause(tried[0], best, job);
+            return;
+        }
         const std::size_t share =
             half    ? rays / 2
             : small ? rays / 4
                     : std::min(std::max(least_share, rays / share_of_job), rays / (count + 1));
         // Who comes second finds in caches what the first one read.
-        const bool best_first =
-            rounds_[index(tried[0])].fetch_add(1, std::memory_order_relaxed) % 2 != 0;
+        const std::size_t others = rays - count * share;
+        const std::size_t before = large ? others / 2 : odd ? others : 0;
         const auto next = [&](Way way, std::size_t share_rays) {
             const std::size_t from = begin;
             begin += share_rays;
-            return time_a_ray(way, from, begin, trace);
+            return share_rays == 0 ? 0.0f : time_a_ray(way, from, begin, trace);
         };
         std::array<float, way_count> took;
-        float main = 0.0f;
-        if (best_first) main = next(best, rays - count * share);
+        const float first = next(best, before);
         for (std::size_t k = 0; k < count; ++k) took[k] = next(tried[k], share);
-        if (!best_first) main = next(best, end - begin);
+        const float last = next(best, end - begin);
+        const float main = large ? (first + last) / 2 : first + last;
         for (std::size_t k = 0; k < count; ++k) {
             add(tried[k], best, took[k] / main);
             pause(tried[k], best, job, small ? whole_pause : 1);
         }
+    }
+
+    /// Half of the rays go each way, those of one way around those of the other.
+    template <class Trace>
+    void try_half(Way way, Way best, bool odd, std::size_t begin, std::size_t end,
+                  const Trace& trace) {
+        const bool around = odd != needs_many(best);
+        const Way outer = around ? way : best, inner = around ? best : way;
+        const std::size_t quarter = (end - begin) / 4;
+        const std::size_t from = begin + quarter, to = end - quarter;
+        const float before = time_a_ray(outer, begin, from, trace);
+        const float middle = time_a_ray(inner, from, to, trace);
+        const float ratio = (before + time_a_ray(outer, to, end, trace)) / (2.0f * middle);
+        add(way, best, around ? ratio : 1.0f / ratio);
     }
 
     /// A way whose time has yet to be compared: its number plus one, and the time as a float.
@@ -275,16 +318,16 @@ private:
 
     template <class Trace>
     void run_whole(std::span<const Way> ways, Way best, std::uint32_t job, std::size_t begin,
-                   std::size_t end, const Trace& trace) {
+                   std::size_t end, const Trace& trace, bool may_try, std::uint32_t rest) {
         if (const std::uint64_t open = open_.exchange(0, std::memory_order_relaxed); open != 0) {
             const auto tried = static_cast<Way>((open >> 32) - 1);
             const float main = time_a_ray(best, begin, end, trace);
             if (tried == best) return;  // it has won since
             add(tried, best, std::bit_cast<float>(static_cast<std::uint32_t>(open)) / main);
-            pause(tried, best, job, whole_pause);
+            pause(tried, best, job, rest);
             return;
         }
-        if (job % whole_pause == whole_pause - 1)
+        if (may_try)
             if (const auto way = longest_due(ways, best, job)) {
                 open_.store(pack(*way, time_a_ray(*way, begin, end, trace)),
                             std::memory_order_relaxed);

@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <span>
 #include <string>
 #include <thread>
 #include <tuple>
@@ -142,6 +143,23 @@ TEST(SceneChanges, MovingMeshesAreBuiltOnlyWhenTheyChange) {
     }
     // Four meshes share a tree now; the one of another mask keeps its own.
     EXPECT_EQ(scene.commit({.usage = Usage::fixed}).trees_built, 1u);
+}
+
+TEST(SceneChanges, ShapesAreBuiltOnlyWhenTheyChange) {
+    const Sphere spheres[] = {{{0, 0, 0}, 1}, {{3, 0, 0}, 1}};
+    for (const Usage usage : {Usage::fixed, Usage::moving}) {
+        Scene scene;
+        const std::uint32_t id = scene.add(std::span(spheres).first(1)),
+                            mesh = scene.add(random_soup(50, 1));
+        const SceneOptions options{.usage = usage, .refit_limit = 0};
+        EXPECT_EQ(scene.commit(options).trees_built, 2u);
+        scene.update(mesh, random_soup(60, 2));
+        EXPECT_EQ(scene.commit(options).trees_built, 1u);
+        scene.update(id, std::span(spheres));
+        EXPECT_EQ(scene.commit(options).trees_built, 1u);
+        scene.update(mesh, random_soup(70, 3));
+        EXPECT_EQ(scene.commit(options).trees_built, 1u);
+    }
 }
 
 template <class AnyScene>

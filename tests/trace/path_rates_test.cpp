@@ -125,12 +125,14 @@ TEST(PathRates, AWayThatNeedsManyRaysIsNotJudgedByFew) {
 TEST(PathRates, StreamsAreTriedOnHalfOfALargeJobHoweverSlow) {
     Rates rates;
     std::size_t trials = 0;
-    for (int job = 0; job < 200; ++job)
-        for (const Share& share : shares_of(rates, three_ways, 8192, {100, 500, 200, 100})) {
-            if (share.way != PathWay::streams) continue;
-            EXPECT_EQ(share.end - share.begin, 4096u) << job;
-            ++trials;
-        }
+    for (int job = 0; job < 200; ++job) {
+        std::size_t streamed = 0;
+        for (const Share& share : shares_of(rates, three_ways, 8192, {100, 500, 200, 100}))
+            if (share.way == PathWay::streams) streamed += share.end - share.begin;
+        if (streamed == 0) continue;
+        EXPECT_EQ(streamed, 4096u) << job;
+        ++trials;
+    }
     EXPECT_GE(trials, 3u);
 }
 
@@ -148,6 +150,67 @@ TEST(PathRates, OrdersOfLargeBatchesBeginAsNeighboursStart) {
     EXPECT_EQ(first_order(BatchKind::anywhere, 65'536), RayOrder::sorted);
     EXPECT_EQ(first_order(BatchKind::anywhere, 65'535), RayOrder::given);
     EXPECT_EQ(first_order(BatchKind::anywhere - 1, 1'000'000), RayOrder::given);
+}
+
+TEST(PathRates, WaysAreJudgedAlikeWhereverTheDearRaysLie) {
+    // By its place in the job a ray takes up to nine times as long; by the second way a fifth less,
+    // or more.
+    constexpr std::int64_t n = 65'537;
+    constexpr PathWay two[] = {PathWay::packets, PathWay::turns};
+    for (const bool rising : {false, true})
+        for (const int percent : {80, 120}) {
+            Rates rates;
+            std::int64_t by_second = 0;
+            for (int job = 0; job < 100; ++job) {
+                std::size_t at = 0;
+                rates.run(two, 0, n, [&](PathWay way, std::size_t begin, std::size_t end) {
+                    EXPECT_EQ(begin, at);
+                    at = end;
+                    const auto from = static_cast<std::int64_t>(begin),
+                               to = static_cast<std::int64_t>(end);
+                    const std::int64_t middle = (from + to) / 2;
+                    const std::int64_t each = 100 + 800 * (rising ? middle : n - middle) / n;
+                    const bool second = way == PathWay::turns;
+                    if (second) by_second += to - from;
+                    HandClock::passed +=
+                        std::chrono::nanoseconds(each * (to - from) * (second ? percent : 100));
+                });
+                EXPECT_EQ(at, std::size_t{n});
+                EXPECT_EQ(rates.fastest(two),
+                          job > 0 && percent < 100 ? PathWay::turns : PathWay::packets);
+            }
+            EXPECT_GT(by_second, 0);
+            EXPECT_EQ(by_second > 50 * n, percent < 100);
+        }
+}
+
+TEST(PathRates, UndividedJobsGoOneWayEach) {
+    for (const int second : {50, 200}) {
+        Rates rates;
+        constexpr PathWay two[] = {PathWay::packets, PathWay::turns};
+        int by_second = 0;
+        for (int job = 0; job < 100; ++job) {
+            int parts = 0;
+            rates.run_undivided(
+                two, 10, 5010, [&](PathWay way, std::size_t begin, std::size_t end) {
+                    EXPECT_EQ(begin, 10u);
+                    EXPECT_EQ(end, 5010u);
+                    by_second += way == PathWay::turns;
+                    HandClock::passed +=
+                        std::chrono::nanoseconds((way == PathWay::turns ? second : 100) *
+                                                 static_cast<std::int64_t>(end - begin));
+                    ++parts;
+                });
+            EXPECT_EQ(parts, 1);
+        }
+        if (second < 100) {
+            EXPECT_GT(by_second, 80);
+            EXPECT_LT(by_second, 100);
+        } else {
+            EXPECT_GT(by_second, 1);
+            EXPECT_LT(by_second, 10);
+        }
+    }
 }
 
 TEST(PathRates, ASmallJobTriesAnotherWayOnAQuarterOfItsRays) {
@@ -317,19 +380,21 @@ TEST(PathRates, TimesFarOffEitherWayCancel) {
 }
 
 TEST(PathRates, LearnsAfterAMillionJobsOfWaysThatAreAlike) {
-    Rates rates;
-    std::mt19937 random(5);
-    std::lognormal_distribution<float> noise(0.0f, 0.3f);
-    const auto run = [&](const std::array<float, 4>& costs) {
-        rates.run(three_ways, 0, 1024, [&](PathWay way, std::size_t begin, std::size_t end) {
-            const float time = costs[static_cast<std::size_t>(way)] * noise(random);
-            HandClock::passed += std::chrono::nanoseconds(
-                static_cast<std::int64_t>(time * static_cast<float>(end - begin)));
-        });
-    };
-    for (int job = 0; job < 1'000'000; ++job) run({100, 100, 100, 100});
-    for (int job = 0; job < 4000; ++job) run({100, 20, 100, 100});
-    EXPECT_EQ(rates.fastest(three_ways), PathWay::streams);
+    for (unsigned seed = 1; seed <= 6; ++seed) {
+        Rates rates;
+        std::mt19937 random(seed);
+        std::lognormal_distribution<float> noise(0.0f, 0.3f);
+        const auto run = [&](const std::array<float, 4>& costs) {
+            rates.run(three_ways, 0, 1024, [&](PathWay way, std::size_t begin, std::size_t end) {
+                const float time = costs[static_cast<std::size_t>(way)] * noise(random);
+                HandClock::passed += std::chrono::nanoseconds(
+                    static_cast<std::int64_t>(time * static_cast<float>(end - begin)));
+            });
+        };
+        for (int job = 0; job < 1'000'000; ++job) run({100, 100, 100, 100});
+        for (int job = 0; job < 4000; ++job) run({100, 20, 100, 100});
+        EXPECT_EQ(rates.fastest(three_ways), PathWay::streams) << seed;
+    }
 }
 
 TEST(PathRates, EachWayHasItsTurnInSmallJobs) {
