@@ -9,6 +9,7 @@
 
 #include "exec/warp_sort.h"
 #include "support/lane_warp.h"
+#include "support/sanitized.h"
 #include "tree/hploc_launches.h"
 
 namespace raydix::test {
@@ -86,7 +87,10 @@ struct HplocResult {
 };
 
 TEST(LaneWarp, MergesClustersAsTheHostDoes) {
-    for (const std::uint32_t n : {2u, 33u, 400u}) {
+    // Two warps and four, each of which meets another at once: there the thread sanitizer sees
+    // whether lanes lean on what only one of theirs has acquired. It did not with 400.
+    for (const std::uint32_t n : {2u, 33u, 64u, 100u, 400u}) {
+        if (sanitized && n > 100) continue;
         SCOPED_TRACE(std::to_string(n) + " primitives, seed " + std::to_string(n));
         const HplocInput input(n, n);
         HostLauncher<> host;

@@ -20,17 +20,18 @@ namespace raydix::test {
 /// does not come before all have seen the last one's.
 class LaneBoard {
 public:
-    /// Leaves `value` and waits for those of all lanes.
+    /// Leaves `value` and waits for those of all lanes. The orders are constants: GCC takes one
+    /// that it does not know when it compiles for the strongest.
+    template <bool orders_memory>
     std::array<std::uint32_t, warp_lanes> exchange(std::uint32_t lane, std::uint32_t turn,
-                                                   std::uint32_t value, bool orders_memory) {
-        place(lane, turn)
-            .store(std::uint64_t{turn} << 32 | value,
-                   orders_memory ? std::memory_order_release : std::memory_order_relaxed);
+                                                   std::uint32_t value) {
+        constexpr auto leave =
+            orders_memory ? std::memory_order_release : std::memory_order_relaxed;
+        constexpr auto find = orders_memory ? std::memory_order_acquire : std::memory_order_relaxed;
+        place(lane, turn).store(std::uint64_t{turn} << 32 | value, leave);
         std::array<std::uint32_t, warp_lanes> values;
         for (std::uint32_t other = 0; other < warp_lanes; ++other)
-            values[other] =
-                wait_for(place(other, turn), turn,
-                         orders_memory ? std::memory_order_acquire : std::memory_order_relaxed);
+            values[other] = wait_for<find>(place(other, turn), turn);
         return values;
     }
 
@@ -41,8 +42,8 @@ private:
     std::atomic<std::uint64_t>& place(std::uint32_t lane, std::uint32_t turn) {
         return places_[lane].of_turn[turn % 2];
     }
-    static std::uint32_t wait_for(const std::atomic<std::uint64_t>& place, std::uint32_t turn,
-                                  std::memory_order order) {
+    template <std::memory_order order>
+    static std::uint32_t wait_for(const std::atomic<std::uint64_t>& place, std::uint32_t turn) {
         for (;;) {
             const std::uint64_t there = place.load(order);
             if (there >> 32 == turn) return static_cast<std::uint32_t>(there);
@@ -100,13 +101,13 @@ public:
         }
     }
     /// A release and an acquire of every lane.
-    void sync() const { static_cast<void>(self.board->exchange(self.lane, ++self.turn, 0, true)); }
+    void sync() const { static_cast<void>(self.board->exchange<true>(self.lane, ++self.turn, 0)); }
 
     static inline thread_local LaneIdentity self;
 
 private:
     static std::array<std::uint32_t, warp_lanes> exchange(std::uint32_t value) {
-        return self.board->exchange(self.lane, ++self.turn, value, false);
+        return self.board->exchange<false>(self.lane, ++self.turn, value);
     }
 };
 
