@@ -95,7 +95,7 @@ def build(programs):
 
 
 def configure(folder):
-    return run(["cmake", "-G", "Ninja", "-S", str(SOURCE), "-B", str(folder), *OPTIONS[folder], "-DRAYDIX_INSTRUCTION_SETS=ONE",
+    return run(["cmake", "-G", "Ninja", "-S", str(SOURCE), "-B", str(folder), *OPTIONS[folder], "-DRAYDIX_INSTRUCTION_SETS=ENDS",
                 "-DRAYDIX_BENCH=OFF", "-DRAYDIX_CLI=OFF", "-DRAYDIX_ATTACK=OFF", "-DRAYDIX_CUDA=OFF", "-DRAYDIX_HIP=OFF"]) == 0
 
 
