@@ -571,10 +571,10 @@ FAULTS = [
     Fault("src/exec/path_rates.h", "if (kind.view) rates.see(*kind.view);", "", "ways: another view changes nothing", "trace"),
     Fault("src/exec/path_rates.h", "std::fabs(way[axis] - other.way[axis]) > turn", "false",
           "ways: a camera that turned has the view it had", "trace"),
-    Fault("src/exec/path_rates.h", "set(third, cost(third) * won);", "",
+    Fault("src/exec/path_rates.h", "set(third, std::max(cost(third) * won, std::min(cost(third), cost(other))));", "",
           "ways: one that rests falls behind two that win from each other by chance", "trace"),
     Fault("src/exec/path_rates.h", "if (half && large) {", "if (false) {",
           "ways: the first half of a large job is compared with the second", "trace"),
-    Fault("src/exec/path_rates.h", "run_whole(ways, fastest(ways), job, begin, end, trace, job > 0, 1);",
-          "trace(fastest(ways), begin, end);", "orders: none but the first is ever tried", "trace"),
+    Fault("src/exec/path_rates.h", "std::max(cost(third) * won, std::min(cost(third), cost(other)))", "cost(third) * won",
+          "ways: a slower one passes another that has just won", "trace"),
 ]

@@ -25,7 +25,7 @@ enum class RayOrder : std::uint8_t { given, sorted };
 
 /// Ways that are slow with a small part of a job's rays, however fast they are with all of them.
 constexpr bool needs_many(PathWay way) { return way == PathWay::streams; }
-constexpr bool needs_many(RayOrder) { return false; }
+constexpr bool needs_many(RayOrder order) { return order == RayOrder::sorted; }
 
 /// Of a batch from about one place in about one direction, as a picture is.
 struct BatchView {
@@ -64,20 +64,25 @@ public:
         if (ways.size() < 2 || rays == 0) {
             if (rays != 0) trace(best, begin, end);
         } else if (rays < least_to_divide) {
-            run_whole(ways, best, job, begin, end, trace, job % whole_pause == whole_pause - 1,
-                      whole_pause);
+            run_whole(ways, best, job, begin, end, trace);
         } else {
             run_divided(ways, best, job, begin, end, trace);
         }
     }
 
-    /// The same of a job that goes one way as a whole, since ways suit many rays. In a trial the
-    /// next job is timed beside it.
+    /// The same of a job whose ways suit many rays alone. In a trial each has half of them.
     template <class Trace>
-    void run_undivided(std::span<const Way> ways, std::size_t begin, std::size_t end,
-                       const Trace& trace) {
+    void run_halves(std::span<const Way> ways, std::size_t begin, std::size_t end,
+                    const Trace& trace) {
         const std::uint32_t job = jobs_.fetch_add(1, std::memory_order_relaxed);
-        run_whole(ways, fastest(ways), job, begin, end, trace, job > 0, 1);
+        const Way best = fastest(ways);
+        const auto tried = job > 0 ? longest_due(ways, best, job) : std::nullopt;
+        if (!tried) {
+            trace(best, begin, end);
+            return;
+        }
+        try_half(*tried, best, next_is_odd(*tried), begin, end, trace);
+        pause(*tried, best, job);
     }
 
     /// The first one where nothing is known yet.
@@ -102,7 +107,7 @@ public:
         if (trials == 0) {
             set(way, now);
         } else {
-            const float weight = trials == 1 ? 0.67f : std::max(1.0f / trials, 0.1f);
+            const float weight = trials == 1 ? 0.67f : std::max(1.0f / trials, 0.15f);
             const float change = std::clamp(now / cost(way), 1 / most_change, most_change);
             set(way, cost(way) * std::pow(change, weight));
         }
@@ -110,11 +115,13 @@ public:
         if (const float won = cost(way) / cost(other); won < 1.0f) {
             // It may have lost by chance: then it is not to rest for long.
             set_trials(other, std::min(trials_of(other), often_tried));
-            // Nor are the rest to seem the slower whenever another one leads.
+            if (!led) due_[index(other)].store(jobs_ + least_pause, std::memory_order_relaxed);
+            // Nor are the rest to seem the slower for it, down to the one that has lost: two that
+            // win from each other by chance would leave them behind without end.
             for (std::size_t k = 0; k < way_count && !led; ++k)
                 if (k != index(way) && k != index(other)) {
                     const Way third = static_cast<Way>(k);
-                    set(third, cost(third) * won);
+                    set(third, std::max(cost(third) * won, std::min(cost(third), cost(other))));
                 }
         }
         keep_in_range();
@@ -153,7 +160,7 @@ private:
     static constexpr float most_at_once = 16.0f, near_cost = 1.2f, most_change = 4.0f;
     static constexpr float least_cost = 0x1p-10f;
     static constexpr std::uint32_t least_pause = 8, longest_pause = 1024;
-    static constexpr std::uint8_t often_tried = 4, most_trials = 10;  // that are told apart
+    static constexpr std::uint8_t often_tried = 4, most_trials = 8;  // that are told apart
     /// Of jobs that go another way as a whole: rays of one that is asked once should not suffer.
     static constexpr std::uint32_t whole_pause = 4;
     static constexpr std::size_t least_to_divide = 128;
@@ -229,6 +236,11 @@ private:
         due_[index(way)].store(job + jobs, std::memory_order_relaxed);
     }
 
+    /// Whether that is so of the number of trials of a way.
+    bool next_is_odd(Way way) {
+        return rounds_[index(way)].fetch_add(1, std::memory_order_relaxed) % 2 != 0;
+    }
+
     /// Which of those that are due has waited longest, so that each has its turn.
     [[nodiscard]] std::optional<Way> longest_due(std::span<const Way> ways, Way best,
                                                  std::uint32_t job) const {
@@ -265,9 +277,7 @@ private:
         const bool half =
             count == 1 && ((needs_many(tried[0]) && rays >= least_of_many) ||
                            (known(tried[0]) && cost(tried[0]) < half_below * cost(best)));
-        const bool odd = rounds_[index(tried[0])].fetch_add(1, std::memory_order_relaxed) % 2 != 0;
-        // What rays take often rises or falls from one end of a batch to the other, as in a picture
-        // from the sky to the ground: one way lies around the other, if that leaves it enough.
+        const bool odd = next_is_odd(tried[0]);
         const bool large = rays >= 2 * least_of_many;
         if (half && large) {
             try_half(tried[0], best, odd, begin, end, trace);
@@ -278,37 +288,51 @@ private:
             half    ? rays / 2
             : small ? rays / 4
                     : std::min(std::max(least_share, rays / share_of_job), rays / (count + 1));
-        // Who comes second finds in caches what the first one read.
-        const std::size_t others = rays - count * share;
-        const std::size_t before = large ? others / 2 : odd ? others : 0;
+        std::array<float, way_count> took;
+        float main = 0.0f;
         const auto next = [&](Way way, std::size_t share_rays) {
             const std::size_t from = begin;
             begin += share_rays;
-            return share_rays == 0 ? 0.0f : time_a_ray(way, from, begin, trace);
+            return time_a_ray(way, from, begin, trace);
         };
-        std::array<float, way_count> took;
-        const float first = next(best, before);
-        for (std::size_t k = 0; k < count; ++k) took[k] = next(tried[k], share);
-        const float last = next(best, end - begin);
-        const float main = large ? (first + last) / 2 : first + last;
+        // Who comes second finds in caches what the first one read. In a large job what rays take
+        // often rises and falls along it, as in a picture from the sky to the ground: those that
+        // are tried lie in its middle, or else at both ends.
+        const std::size_t rest = rays - count * share;
+        if (large && !odd) {
+            main = next(best, rest / 2);
+            for (std::size_t k = 0; k < count; ++k) took[k] = next(tried[k], share);
+            main = (main + next(best, end - begin)) / 2;
+        } else if (large) {
+            for (std::size_t k = 0; k < count; ++k) took[k] = next(tried[k], share / 2);
+            main = next(best, rest);
+            for (std::size_t k = count; k-- > 0;)
+                took[k] = (took[k] + next(tried[k], k > 0 ? share / 2 : end - begin)) / 2;
+        } else {
+            if (odd) main = next(best, rest);
+            for (std::size_t k = 0; k < count; ++k) took[k] = next(tried[k], share);
+            if (!odd) main = next(best, end - begin);
+        }
         for (std::size_t k = 0; k < count; ++k) {
             add(tried[k], best, took[k] / main);
             pause(tried[k], best, job, small ? whole_pause : 1);
         }
     }
 
-    /// Half of the rays go each way, those of one way around those of the other.
+    /// Half of the rays go each way, those of one around those of the other: who needs many has his
+    /// in one piece, else it changes.
     template <class Trace>
     void try_half(Way way, Way best, bool odd, std::size_t begin, std::size_t end,
                   const Trace& trace) {
-        const bool around = odd != needs_many(best);
+        const bool around = needs_many(best) || (odd && !needs_many(way));
         const Way outer = around ? way : best, inner = around ? best : way;
         const std::size_t quarter = (end - begin) / 4;
         const std::size_t from = begin + quarter, to = end - quarter;
         const float before = time_a_ray(outer, begin, from, trace);
         const float middle = time_a_ray(inner, from, to, trace);
-        const float ratio = (before + time_a_ray(outer, to, end, trace)) / (2.0f * middle);
-        add(way, best, around ? ratio : 1.0f / ratio);
+        const float outside = (before + time_a_ray(outer, to, end, trace)) / 2.0f;
+        if (middle > 0.0f && outside > 0.0f)
+            add(way, best, around ? outside / middle : middle / outside);
     }
 
     /// A way whose time has yet to be compared: its number plus one, and the time as a float.
@@ -318,16 +342,16 @@ private:
 
     template <class Trace>
     void run_whole(std::span<const Way> ways, Way best, std::uint32_t job, std::size_t begin,
-                   std::size_t end, const Trace& trace, bool may_try, std::uint32_t rest) {
+                   std::size_t end, const Trace& trace) {
         if (const std::uint64_t open = open_.exchange(0, std::memory_order_relaxed); open != 0) {
             const auto tried = static_cast<Way>((open >> 32) - 1);
             const float main = time_a_ray(best, begin, end, trace);
             if (tried == best) return;  // it has won since
             add(tried, best, std::bit_cast<float>(static_cast<std::uint32_t>(open)) / main);
-            pause(tried, best, job, rest);
+            pause(tried, best, job, whole_pause);
             return;
         }
-        if (may_try)
+        if (job % whole_pause == whole_pause - 1)
             if (const auto way = longest_due(ways, best, job)) {
                 open_.store(pack(*way, time_a_ray(*way, begin, end, trace)),
                             std::memory_order_relaxed);

@@ -184,31 +184,21 @@ TEST(PathRates, WaysAreJudgedAlikeWhereverTheDearRaysLie) {
         }
 }
 
-TEST(PathRates, UndividedJobsGoOneWayEach) {
-    for (const int second : {50, 200}) {
-        Rates rates;
-        constexpr PathWay two[] = {PathWay::packets, PathWay::turns};
-        int by_second = 0;
+TEST(PathRates, OfTwoFasterWaysTheFasterOneLeads) {
+    Rates rates;
+    rates.add(PathWay::streams, PathWay::packets, 0.5f);
+    rates.add(PathWay::turns, PathWay::packets, 0.6f);
+    EXPECT_EQ(rates.fastest(three_ways), PathWay::streams);
+    constexpr PathWay without_streams[] = {PathWay::packets, PathWay::turns};
+    EXPECT_EQ(rates.fastest(without_streams), PathWay::turns);
+    // Two are tried at once, beside the first way.
+    constexpr PathWay two_and_first[] = {PathWay::packets, PathWay::turns, PathWay::alone};
+    for (const std::size_t rays : {1024u, 8192u}) {
+        Rates measured;
         for (int job = 0; job < 100; ++job) {
-            int parts = 0;
-            rates.run_undivided(
-                two, 10, 5010, [&](PathWay way, std::size_t begin, std::size_t end) {
-                    EXPECT_EQ(begin, 10u);
-                    EXPECT_EQ(end, 5010u);
-                    by_second += way == PathWay::turns;
-                    HandClock::passed +=
-                        std::chrono::nanoseconds((way == PathWay::turns ? second : 100) *
-                                                 static_cast<std::int64_t>(end - begin));
-                    ++parts;
-                });
-            EXPECT_EQ(parts, 1);
-        }
-        if (second < 100) {
-            EXPECT_GT(by_second, 80);
-            EXPECT_LT(by_second, 100);
-        } else {
-            EXPECT_GT(by_second, 1);
-            EXPECT_LT(by_second, 10);
+            static_cast<void>(shares_of(measured, two_and_first, rays, {1000, 1, 300, 280}));
+            EXPECT_EQ(measured.fastest(two_and_first), job > 0 ? PathWay::alone : PathWay::packets)
+                << job;
         }
     }
 }
@@ -469,7 +459,10 @@ TEST(PathRates, ManyThreadsMayAskAndAdd) {
                 }
             });
     }
-    EXPECT_GT(traced, threads * jobs * 100);
+    std::size_t given = 0;
+    for (std::size_t t = 0; t < threads; ++t)
+        for (std::size_t job = 0; job < jobs; ++job) given += job % 3 == t % 3 ? rays : 100;
+    EXPECT_EQ(traced, given);
 }
 
 TEST(PathRates, ThoseThatShareKnowWhatEitherLearns) {
