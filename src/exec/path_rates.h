@@ -70,7 +70,8 @@ public:
         }
     }
 
-    /// The same of a job whose ways suit many rays alone. In a trial each has half of them.
+    /// The same of a job whose ways suit many rays alone. In a trial each has half of them, who
+    /// needs many those in the middle.
     template <class Trace>
     void run_halves(std::span<const Way> ways, std::size_t begin, std::size_t end,
                     const Trace& trace) {
@@ -81,7 +82,7 @@ public:
             trace(best, begin, end);
             return;
         }
-        try_half(*tried, best, next_is_odd(*tried), begin, end, trace);
+        try_half(*tried, best, false, begin, end, trace);
         pause(*tried, best, job);
     }
 
@@ -319,12 +320,15 @@ private:
         }
     }
 
-    /// Half of the rays go each way, those of one around those of the other: who needs many has his
-    /// in one piece, else it changes.
+    /// Half of the rays go each way, those of one around those of the other. Which one changes; in
+    /// a job that is not so large, who needs many rays has his in one piece.
     template <class Trace>
     void try_half(Way way, Way best, bool odd, std::size_t begin, std::size_t end,
                   const Trace& trace) {
-        const bool around = needs_many(best) || (odd && !needs_many(way));
+        const bool outside_first = needs_many(best);
+        const bool changes =
+            end - begin >= 4 * least_of_many || !(outside_first || needs_many(way));
+        const bool around = (changes && odd) != outside_first;
         const Way outer = around ? way : best, inner = around ? best : way;
         const std::size_t quarter = (end - begin) / 4;
         const std::size_t from = begin + quarter, to = end - quarter;
