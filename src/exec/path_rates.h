@@ -55,7 +55,8 @@ public:
     /// large and needs_many(way), or once it has been tried twice and takes less than twice the
     /// time. A job of fewer than 512 tries one way at most, every fourth one if a way is due, with
     /// a quarter of its rays, or half if that way is not much slower. A job of fewer than 128 rays
-    /// goes the other way as a whole, and the next one is timed beside it.
+    /// goes the other way as a whole, and the next one is timed beside it. In a job of 4,096 rays
+    /// or more the rays of one way lie around those of the other.
     template <class Trace>
     void run(std::span<const Way> ways, std::size_t begin, std::size_t end, const Trace& trace) {
         const std::uint32_t job = jobs_.fetch_add(1, std::memory_order_relaxed);
@@ -325,10 +326,9 @@ private:
     template <class Trace>
     void try_half(Way way, Way best, bool odd, std::size_t begin, std::size_t end,
                   const Trace& trace) {
-        const bool outside_first = needs_many(best);
-        const bool changes =
-            end - begin >= 4 * least_of_many || !(outside_first || needs_many(way));
-        const bool around = (changes && odd) != outside_first;
+        const bool best_inside = needs_many(best);
+        const bool changes = end - begin >= 4 * least_of_many || !(best_inside || needs_many(way));
+        const bool around = (changes && odd) != best_inside;
         const Way outer = around ? way : best, inner = around ? best : way;
         const std::size_t quarter = (end - begin) / 4;
         const std::size_t from = begin + quarter, to = end - quarter;

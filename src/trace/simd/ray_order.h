@@ -13,7 +13,7 @@ inline constexpr std::size_t least_rays_to_sort = 16384;
 
 /// Rays 0 to n - 1, least_rays_to_sort or more, by trace(order, begin, end). Batches that are alike
 /// try both orders and go on with the faster one; large ones whose rays start anywhere begin with
-/// sorted rays. In a trial each order has half of the rays: of a
+/// sorted rays. In a trial each order has half of the rays, the sorted ones in the middle: of a
 /// smaller part more threads would wait for the last job.
 template <class Trace>
 void run_in_better_order(OrderRates& rates, const BatchKind& kind, std::size_t n,
