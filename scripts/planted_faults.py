@@ -573,8 +573,6 @@ FAULTS = [
           "ways: a camera that turned has the view it had", "trace"),
     Fault("src/exec/path_rates.h", "set(third, std::max(cost(third) * won, std::min(cost(third), cost(other))));", "",
           "ways: one that rests falls behind two that win from each other by chance", "trace"),
-    Fault("src/exec/path_rates.h", "if (half && large) {", "if (false) {",
-          "ways: the first half of a large job is compared with the second", "trace"),
     Fault("src/exec/path_rates.h", "std::max(cost(third) * won, std::min(cost(third), cost(other)))", "cost(third) * won",
           "ways: a slower one passes another that has just won", "trace"),
 ]
