@@ -83,7 +83,8 @@ public:
             trace(best, begin, end);
             return;
         }
-        try_half(*tried, best, false, begin, end, trace);
+        try_around(std::span(&*tried, 1), best, (end - begin) / 2, needs_many(best), begin, end,
+                   trace);
         pause(*tried, best, job);
     }
 
@@ -99,7 +100,9 @@ public:
     /// A ray took so many times as long by `way` as one beside it by `other`, which is the first to
     /// be known or known already. It is lost if another thread adds something at the same time.
     void add(Way way, Way other, float ratio) {
-        if (!(ratio > 0.0f) || adding_.test_and_set(std::memory_order_acquire)) return;
+        if (!(ratio > 0.0f && ratio < std::numeric_limits<float>::infinity()) ||
+            adding_.test_and_set(std::memory_order_acquire))
+            return;
         if (!known(other)) set(other, 1.0f);
         const float now = cost(other) * std::clamp(ratio, 1 / most_at_once, most_at_once);
         const bool led = known(way) && cost(way) < cost(other);
@@ -281,62 +284,56 @@ private:
                            (known(tried[0]) && cost(tried[0]) < half_below * cost(best)));
         const bool odd = next_is_odd(tried[0]);
         const bool large = rays >= 2 * least_of_many;
-        if (half && large) {
-            try_half(tried[0], best, odd, begin, end, trace);
-            pause(tried[0], best, job);
-            return;
-        }
         const std::size_t share =
             half    ? rays / 2
             : small ? rays / 4
                     : std::min(std::max(least_share, rays / share_of_job), rays / (count + 1));
-        std::array<float, way_count> took;
-        float main = 0.0f;
-        const auto next = [&](Way way, std::size_t share_rays) {
-            const std::size_t from = begin;
-            begin += share_rays;
-            return time_a_ray(way, from, begin, trace);
-        };
-        // Who comes second finds in caches what the first one read. In a large job what rays take
-        // often rises and falls along it, as in a picture from the sky to the ground: those that
-        // are tried lie in its middle, or else at both ends.
-        const std::size_t rest = rays - count * share;
-        if (large && !odd) {
-            main = next(best, rest / 2);
-            for (std::size_t k = 0; k < count; ++k) took[k] = next(tried[k], share);
-            main = (main + next(best, end - begin)) / 2;
-        } else if (large) {
-            for (std::size_t k = 0; k < count; ++k) took[k] = next(tried[k], share / 2);
-            main = next(best, rest);
-            for (std::size_t k = count; k-- > 0;)
-                took[k] = (took[k] + next(tried[k], k > 0 ? share / 2 : end - begin)) / 2;
+        const auto those = std::span(tried).first(count);
+        if (large) {
+            // Who needs many rays has half of a job that is not so large in one piece.
+            const bool best_inside = half && needs_many(best);
+            const bool changes =
+                !half || rays >= 4 * least_of_many || !(best_inside || needs_many(tried[0]));
+            try_around(those, best, share, (changes && odd) != best_inside, begin, end, trace);
         } else {
-            if (odd) main = next(best, rest);
-            for (std::size_t k = 0; k < count; ++k) took[k] = next(tried[k], share);
-            if (!odd) main = next(best, end - begin);
+            // Who comes second finds in caches what the first one read.
+            const std::size_t rest = rays - count * share, from = odd ? begin + rest : begin;
+            std::array<float, way_count> took;
+            float main = 0.0f;
+            if (odd) main = time_a_ray(best, begin, from, trace);
+            for (std::size_t k = 0; k < count; ++k)
+                took[k] = time_a_ray(those[k], from + k * share, from + (k + 1) * share, trace);
+            if (!odd) main = time_a_ray(best, end - rest, end, trace);
+            for (std::size_t k = 0; k < count; ++k) add(those[k], best, took[k] / main);
         }
-        for (std::size_t k = 0; k < count; ++k) {
-            add(tried[k], best, took[k] / main);
-            pause(tried[k], best, job, small ? whole_pause : 1);
-        }
+        for (const Way way : those) pause(way, best, job, small ? whole_pause : 1);
     }
 
-    /// Half of the rays go each way, those of one around those of the other. Which one changes; in
-    /// a job that is not so large, who needs many rays has his in one piece.
+    /// `share` rays go each of the ways that are tried: those in the middle, or else at both ends.
+    /// What rays take often rises and falls along a job, as in a picture from the sky to the
+    /// ground.
     template <class Trace>
-    void try_half(Way way, Way best, bool odd, std::size_t begin, std::size_t end,
-                  const Trace& trace) {
-        const bool best_inside = needs_many(best);
-        const bool changes = end - begin >= 4 * least_of_many || !(best_inside || needs_many(way));
-        const bool around = (changes && odd) != best_inside;
-        const Way outer = around ? way : best, inner = around ? best : way;
-        const std::size_t quarter = (end - begin) / 4;
-        const std::size_t from = begin + quarter, to = end - quarter;
-        const float before = time_a_ray(outer, begin, from, trace);
-        const float middle = time_a_ray(inner, from, to, trace);
-        const float outside = (before + time_a_ray(outer, to, end, trace)) / 2.0f;
-        if (middle > 0.0f && outside > 0.0f)
-            add(way, best, around ? outside / middle : middle / outside);
+    void try_around(std::span<const Way> tried, Way best, std::size_t share, bool at_ends,
+                    std::size_t begin, std::size_t end, const Trace& trace) {
+        const auto next = [&](Way way, std::size_t rays) {
+            const std::size_t from = begin;
+            begin += rays;
+            return time_a_ray(way, from, begin, trace);
+        };
+        const std::size_t rest = end - begin - tried.size() * share;
+        std::array<float, way_count> took;
+        float main = 0.0f;
+        if (at_ends) {
+            for (std::size_t k = 0; k < tried.size(); ++k) took[k] = next(tried[k], share / 2);
+            main = next(best, rest);
+            for (std::size_t k = tried.size(); k-- > 0;)
+                took[k] = (took[k] + next(tried[k], k > 0 ? share / 2 : end - begin)) / 2;
+        } else {
+            main = next(best, rest / 2);
+            for (std::size_t k = 0; k < tried.size(); ++k) took[k] = next(tried[k], share);
+            main = (main + next(best, end - begin)) / 2;
+        }
+        for (std::size_t k = 0; k < tried.size(); ++k) add(tried[k], best, took[k] / main);
     }
 
     /// A way whose time has yet to be compared: its number plus one, and the time as a float.
