@@ -124,7 +124,8 @@ public:
     std::uint32_t insert(std::span<const Point> points);
     /// Removes points by their numbers. Those that are not in the index any more, or were left out,
     /// are passed over. Returns how many were removed. All is built again when more than a quarter
-    /// of the points have gone. Needs the index for itself. Throws InputError, and nothing is
+    /// of the points have gone; where that fails, for want of memory or of a thread, queries stay
+    /// slower until a later removal. Needs the index for itself. Throws InputError, and nothing is
     /// removed: a number that was never given.
     std::uint32_t remove(std::span<const std::uint32_t> ids);
 

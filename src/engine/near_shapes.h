@@ -45,16 +45,27 @@ inline ShapePointD rounded_point(Double3 position, Double3 lo, Double3 hi, doubl
     return {p, u, squared_distance(p, query)};
 }
 
+inline double largest_component(Double3 v) {
+    return std::max({std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)});
+}
+/// A power of two that leaves the products of a vector's components finite: 1 but for vectors so
+/// long that their squares overflow.
+inline double scale_of_products(Double3 v) {
+    return largest_component(v) > 0x1p500 ? 0x1p-600 : 1.0;
+}
+
 /// Of the points within `radius` of the segment a, b.
 template <class Vec>
 auto closest_on_capsule(Double3 a, Double3 b, double radius, Vec q) {
-    const Double3 query(q), axis = b - a;
-    const double length2 = dot(axis, axis);
-    const double u = length2 > 0.0 ? std::clamp(dot(query - a, axis) / length2, 0.0, 1.0) : 0.0;
+    const Double3 query(q), axis = b - a, from = query - a;
+    const double length2 = dot(axis, axis), scale = scale_of_products(from);
+    const double u =
+        length2 > 0.0 ? std::clamp(dot(from * scale, axis) / length2 / scale, 0.0, 1.0) : 0.0;
     const Double3 on_axis = u == 1.0 ? b : a + axis * u;
-    const Double3 off = query - on_axis;
+    const Double3 off = (query - on_axis) * scale;
     const double distance = length(off);
-    const Double3 position = distance <= radius ? query : on_axis + off * (radius / distance);
+    const Double3 position =
+        distance <= radius * scale ? query : on_axis + off * (radius / distance);
     const auto least = [&](double x, double y) { return std::min(x, y) - radius; };
     const auto largest = [&](double x, double y) { return std::max(x, y) + radius; };
     return rounded_point(position, {least(a.x, b.x), least(a.y, b.y), least(a.z, b.z)},
@@ -86,6 +97,8 @@ public:
     /// (Newton's steps for 1 / |w|, which come from one side; More, Sorensen 1983).
     [[nodiscard]] Double3 closest(Double3 y) const {
         if (most_ == 0.0) return {};
+        if (const double far = largest_component(y); far > 0x1p500)  // its direction decides
+            y = y * std::scalbn(1.0, 300 - std::ilogb(far));
         double g[3], outside = 0.0, s = 0.0;
         for (std::size_t k = 0; k < 3; ++k) {
             g[k] = dot(axis_[k], y) / most_;
@@ -152,14 +165,15 @@ auto closest_on_image(Double3 a, Double3 b, const BallImage& ball, double radius
     if (const double scale = ball.scale(); scale > 0.0)
         return closest_on_capsule(a, b, scale * radius, q);
     const Double3 query(q), axis = b - a;
+    const double products = scale_of_products(query - a);
     // The distance from a + u * axis + ball is convex in u: its slope has the sign of -off . axis.
     double u = 0.0;
     Double3 on_ball = ball.closest(query - a);
-    if (dot(axis, axis) > 0.0 && dot(query - a - on_ball, axis) > 0.0) {
+    if (dot(axis, axis) > 0.0 && dot((query - a - on_ball) * products, axis) > 0.0) {
         double from = 0.0, to = 1.0;
         const auto goes_on = [&](double at) {
             on_ball = ball.closest(query - a - axis * at);
-            return dot(query - a - axis * at - on_ball, axis) > 0.0;
+            return dot((query - a - axis * at - on_ball) * products, axis) > 0.0;
         };
         u = 1.0;
         if (!goes_on(1.0)) {

@@ -434,6 +434,37 @@ TEST(DoubleNear, ShapesAnswerWhatTheyAre) {
     EXPECT_EQ(closest_point(outer, home).instance, 1u);
 }
 
+/// The square of a distance has no end, but the point is that of a place on the same line that is
+/// near enough for squares.
+TEST(DoubleNear, ShapesAreFoundFromTheEndOfAllDoubles) {
+    const std::vector<SphereD> spheres{{{1, -2, 3}, 2}};
+    const std::vector<CapsuleD> capsules{{{4, 0, 1}, {7, 1, -1}, 0.5}};
+    TransformD wide;
+    wide.m[0][0] = 3, wide.m[1][0] = 0.5;
+    for (const bool capsule : {false, true}) {
+        SceneD plain, image;
+        if (capsule)
+            plain.add(std::span<const CapsuleD>(capsules));
+        else
+            plain.add(std::span<const SphereD>(spheres));
+        plain.commit();
+        image.add(plain, wide);
+        image.commit();
+        for (const SceneD* const scene : {&plain, &image})
+            for (const Vec3d& way : {Vec3d{1, 0.3, -1}, Vec3d{-0.4, 1, 0.2}, Vec3d{0, 0, -1}}) {
+                const Vec3d near = closest_point(*scene, way * 0x1p100).position;
+                for (const int exponent : {400, 500, 501, 515, 700, 1000, 1023}) {
+                    const SceneClosestPointD p =
+                        closest_point(*scene, way * std::ldexp(1.0, exponent));
+                    ASSERT_EQ(p.geometry, 0u);
+                    EXPECT_NEAR(p.position.x, near.x, 1e-12) << capsule << ' ' << exponent;
+                    EXPECT_NEAR(p.position.y, near.y, 1e-12) << capsule << ' ' << exponent;
+                    EXPECT_NEAR(p.position.z, near.z, 1e-12) << capsule << ' ' << exponent;
+                }
+            }
+    }
+}
+
 TEST(DoubleNear, ErrorsNameTheGeometry) {
     const std::vector<SphereD> spheres{{{0, 0, 0}, 1}};
     const std::vector<AabbD> boxes{{{0, 0, 0}, {1, 1, 1}}};

@@ -274,6 +274,29 @@ TEST(ThreadPool, ChangingPointsStayWholeWhenALoopIsRefused) {
     }
 }
 
+/// What was taken out is told, whether or not the rest could be built again.
+TEST(ThreadPool, RemovalsAreDoneWhereALoopIsRefused) {
+    std::vector<Vec3> points;
+    std::vector<std::uint32_t> even;
+    for (std::uint32_t i = 0; i < 60'000; ++i) {
+        points.push_back({float(i % 311), float(i % 353), float(i % 397)});
+        if (i % 2 == 0) even.push_back(i);
+    }
+    const std::span queries = std::span<const Vec3>(points).first(20);
+    Points wanted = build_points(points);
+    const int loops = loops_of([&] { EXPECT_EQ(wanted.remove(even), 30'000u); });
+    EXPECT_GT(loops, 3) << "all is built again";
+    const auto nearest = knn(wanted, queries, 3);
+    for (int loop = 0; loop < loops; ++loop) {
+        Points index = build_points(points);
+        EXPECT_FALSE(is_refused(loop, [&] { EXPECT_EQ(index.remove(even), 30'000u); })) << loop;
+        EXPECT_EQ(index.size(), 30'000u) << loop;
+        const auto found = knn(index, queries, 3);
+        EXPECT_TRUE(std::ranges::equal(found.indices.view(), nearest.indices.view())) << loop;
+        EXPECT_EQ(index.remove(std::span(even).first(1)), 0u);
+    }
+}
+
 TEST(ThreadPool, RefitsInDoubleStayWholeWhenALoopIsRefused) {
     MeshD mesh;
     for (std::uint32_t i = 0; i < 20'000; ++i) {
