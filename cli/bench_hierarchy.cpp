@@ -109,6 +109,7 @@ public:
     void run() {
         require_different_names(scenes());
         document_["max_leaf"] = options_.max_leaf;
+        document_["repeat"] = options_.repeat;
         document_["factors"] = options_.factors;
         for (const char* list : {"runs", "builds", "machines", "hierarchy_claims"})
             document_[list] = Json::array();

@@ -211,6 +211,12 @@ public:
         for (const char* list : {"scenes", "builds", "machines", "simulate", "measured",
                                  "published", "claims", "ranking", "width_sweep"})
             document_[list] = Json::array();
+        const std::string& cameras = options.tree.cameras_file;
+        document_["cameras"] = cameras.empty() ? Json(nullptr) : Json(cameras);
+        document_["memory"] = options.memory;
+        document_["error"] = options.error >= 0 ? Json(options.error) : Json(nullptr);
+        document_["sweep_sample"] = options.sweep_sample;
+        document_["repeat"] = options.repeat;
         require_different_names(options.scenes);
         if (on_device()) static_cast<void>(device_name());  // says what is missing, before any work
         for (const std::string& name : options.machines) {
@@ -261,12 +267,16 @@ private:
                  const std::vector<SimulationRow>& rows) {
         LaunchOptions whole = options_.launches;
         whole.sample = 1.0;
+        const std::size_t first = document_["measured"].size();
         const RayLaunches launches(whole, input, options_.common);
         for (const Json& row :
              measure_kind(input.scene.name, std::string(builder_name(input.bvh.options().builder)),
                           tree, launches, kind, rows,
                           {.kernels = kernels_from(options_.kernel), .repeat = options_.repeat}))
             document_["measured"].push_back(row);
+        const Json asked = asked_launches_json(input, launches, kind, whole);
+        for (std::size_t k = first; k < document_["measured"].size(); ++k)
+            document_["measured"][k].update(asked);
     }
 
     void study(const std::string& name) {
@@ -303,7 +313,8 @@ private:
         const Json scene_fields = scene_json(input.scene);
         if (document_["scenes"].empty() || document_["scenes"].back() != scene_fields)
             document_["scenes"].push_back(scene_fields);
-        document_["builds"].push_back(build_json(input.bvh, stats, builds));
+        document_["builds"].push_back(
+            build_json(input.bvh, stats, builds, tree_options.epo_sample));
         const WarpTree tree = warp_tree_for(input.bvh, kernels_from(options_.kernel));
         const RayLaunches launches(options_.launches, input, options_.common);
         if (options_.common.prints_tables())

@@ -1,16 +1,15 @@
 // raydix build, raydix check.
 #include <fmt/format.h>
 #include <raydix/check.h>
-#include <raydix/cwbvh.h>
 #include <raydix/error.h>
 #include <raydix/rdx.h>
 
-#include <chrono>
 #include <memory>
 #include <utility>
 
 #include "device_scene.h"
 #include "kdtree_commands.h"
+#include "layout_builds.h"
 #include "octree_commands.h"
 #include "option_checks.h"
 #include "output.h"
@@ -28,86 +27,54 @@ struct BuildCommand {
 };
 
 /// One warm-up, then `repeat` builds into new memory, and as many into kept memory.
-struct TimedBuilds {
+struct BuiltTree {
     Bvh bvh;
-    std::vector<BuildMs> fresh, kept;
-    std::uint64_t device_bytes = 0;  // held on a device, tree included
+    TimedBuilds builds;
 };
 
-TimedBuilds build_repeatedly(const Mesh& mesh, const BuildOptions& options, int repeat) {
-    TimedBuilds timed;
-    timed.bvh = build_bvh(mesh, options);
+BuiltTree build_repeatedly(const Mesh& mesh, const BuildOptions& options, int repeat) {
+    BuiltTree built{build_bvh(mesh, options), {}};
     for (int i = 0; i < repeat; ++i) {
-        timed.bvh = Bvh();
-        timed.bvh = build_bvh(mesh, options);
-        timed.fresh.push_back(timed.bvh.build_ms());
+        built.bvh = Bvh();
+        built.bvh = build_bvh(mesh, options);
+        built.builds.fresh.push_back(built.bvh.build_ms());
     }
+    built.builds.peak_bytes = built.bvh.peak_bytes();
     BvhBuilder builder;
     Bvh again;
     builder.build(mesh, options, again);
     for (int i = 0; i < repeat; ++i) {
         builder.build(mesh, options, again);
-        timed.kept.push_back(again.build_ms());
+        built.builds.kept.push_back(again.build_ms());
     }
-    return timed;
+    return built;
 }
 
-TimedBuilds build_repeatedly_on_device(const Mesh& mesh, const BuildOptions& options, int repeat) {
+/// The peak is what is held on the device, tree included.
+BuiltTree build_repeatedly_on_device(const Mesh& mesh, const BuildOptions& options, int repeat) {
     DeviceScene device(mesh, options);
-    TimedBuilds timed;
+    TimedBuilds builds;
     static_cast<void>(device.build_fresh());
-    for (int i = 0; i < repeat; ++i) timed.fresh.push_back(device.build_fresh());
-    for (int i = 0; i < repeat; ++i) timed.kept.push_back(device.build_again());
-    timed.bvh = device.download();
-    timed.device_bytes = device.tree_bytes();
-    return timed;
+    for (int i = 0; i < repeat; ++i) builds.fresh.push_back(device.build_fresh());
+    for (int i = 0; i < repeat; ++i) builds.kept.push_back(device.build_again());
+    builds.peak_bytes = device.tree_bytes();
+    return {device.download(), builds};
 }
 
-Spread totals(const std::vector<BuildMs>& builds) {
-    std::vector<double> values;
-    for (const BuildMs& b : builds) values.push_back(b.total);
-    return spread_of(values);
-}
-
-void print_build_table(const Json& build, const TimedBuilds& timed) {
-    print_stages(build, timed.fresh.size());
-    const Spread kept = totals(timed.kept);
-    fmt::print("{:<12} {:>9.2f} {:>9.2f} {:>9.2f}   total into kept memory\n", "rebuild",
-               kept.median, kept.min, kept.max);
-}
-
-/// The compressed wide tree that follows from the binary one; what a trace touches is then its.
-void add_cwbvh(Json& build, const Bvh& bvh, const CommonOptions& common) {
-    const auto start = std::chrono::steady_clock::now();
-    const Cwbvh tree(bvh, common.threads);
-    const std::chrono::duration<double, std::milli> ms = std::chrono::steady_clock::now() - start;
-    const CwbvhStats& s = tree.stats();
-    build["layout"] = "cwbvh";
-    build["layout_nodes"] = s.nodes;
-    build["bytes"] = s.bytes;
-    build["cwbvh"] = {{"nodes", s.nodes},
-                      {"leaves", s.leaf_children},
-                      {"references", s.references},
-                      {"max_depth", s.max_depth},
-                      {"children_per_node", s.children_per_node},
-                      {"sah", s.sah},
-                      {"widening", s.widening},
-                      {"node_bytes", s.node_bytes},
-                      {"triangle_bytes", s.triangle_bytes},
-                      {"bytes_per_triangle", s.bytes_per_triangle},
-                      {"ms", ms.count()}};
-}
-
-void print_cwbvh_table(const Json& cwbvh) {
-    fmt::print("\ncwbvh        {} nodes of {:.2f} children, {} leaves, depth {}, in {:.2f} ms\n",
-               grouped(cwbvh["nodes"].get<std::uint64_t>()),
-               cwbvh["children_per_node"].get<double>(),
-               grouped(cwbvh["leaves"].get<std::uint64_t>()),
-               cwbvh["max_depth"].get<std::uint32_t>(), cwbvh["ms"].get<double>());
-    fmt::print(
-        "SAH          {:.3f}   (node 1, primitive 1), boxes widened to {:.3f} x their area\n",
-        cwbvh["sah"].get<double>(), cwbvh["widening"].get<double>());
-    fmt::print("memory       {:.1f} bytes a triangle\n", cwbvh["bytes_per_triangle"].get<double>());
+void print_build_table(const Json& build, int repeat) {
+    print_stages(build, static_cast<std::size_t>(repeat));
+    const auto line = [](const char* name, const Json& ms, const char* what) {
+        fmt::print("{:<12} {:>9.2f} {:>9.2f} {:>9.2f}   {}\n", name, ms["median"].get<double>(),
+                   ms["min"].get<double>(), ms["max"].get<double>(), what);
+    };
+    line("rebuild", build["kept_ms"], "total into kept memory");
+    if (!build.contains("binary")) return;
+    const Json& binary = build["binary"];
+    line("binary",
+         {{"median", binary["ms"]["total"]},
+          {"min", binary["ms_spread"]["min"]["total"]},
+          {"max", binary["ms_spread"]["max"]["total"]}},
+         "total of the binary tree alone");
 }
 
 /// --tree octree or kdtree.
@@ -140,35 +107,45 @@ void run_build(const BuildCommand& options) {
     document["load_ms"] = scene.load_ms;
     const BuildOptions how = about(
         options.scene, [&] { return options.tree.build_options(scene.mesh(), options.common); });
-    const TimedBuilds timed = about(options.scene, [&] {
+    const BuiltTree built = about(options.scene, [&] {
         const auto build =
             runs_on_device(options.tree.device) ? build_repeatedly_on_device : build_repeatedly;
         return build(scene.mesh(), how, options.repeat);
     });
-    const TreeStats stats = tree_stats(timed.bvh, stats_options(options.tree, options.common));
-    document["scene"]["left_out"] = timed.bvh.left_out();
-    Json build = build_json(timed.bvh, stats, timed.fresh);
+    const Bvh& bvh = built.bvh;
+    const TreeStats stats = tree_stats(bvh, stats_options(options.tree, options.common));
+    document["scene"]["left_out"] = bvh.left_out();
+    Json build = build_json(bvh, stats, built.builds.fresh, options.tree.epo_sample);
+    build["repeat"] = options.repeat;
     build["device"] = options.tree.device;
-    if (is_device(options.tree.device)) {
-        build["peak_bytes"] = timed.device_bytes;
-        build["device_name"] = device_name();
-    }
-    build["kept_ms"] = spread_json(totals(timed.kept));
-    if (options.tree.layout == "cwbvh") add_cwbvh(build, timed.bvh, options.common);
-    if (is_wide_layout(options.tree.layout))
-        add_wide_builds(build, scene.mesh(), how, options.tree.layout, options.repeat);
+    if (is_device(options.tree.device)) build["device_name"] = device_name();
+    build["peak_bytes"] = *built.builds.peak_bytes;
+    build["kept_ms"] = spread_json(totals(built.builds.kept));
+    if (options.tree.layout != "binary")
+        about(options.scene, [&] {
+            const LayoutRequest request{
+                bvh,          scene.mesh(),        how,
+                built.builds, options.tree.layout, is_device(options.tree.device)};
+            keep_binary(build);
+            set_layout_builds(build, options.tree.layout == "cwbvh"
+                                         ? add_cwbvh(build, request)
+                                         : add_wide_builds(build, request));
+        });
     document["build"] = build;
     if (options.common.prints_tables()) {
         fmt::print("{}: {} triangles, {} vertices, loaded in {:.1f} ms\n", scene.name,
                    grouped(scene.mesh().triangles.size()), grouped(scene.mesh().vertices.size()),
                    scene.load_ms);
-        print_build_table(build, timed);
-        print_tree_table(timed.bvh, stats);
+        print_build_table(build, options.repeat);
+        print_tree_table(bvh, stats);
         if (build.contains("cwbvh")) print_cwbvh_table(build["cwbvh"]);
         if (build.contains("wide")) print_wide_table(build["wide"]);
+        if (build.contains("binary"))
+            fmt::print("peak         {:.2f} MB while building, layout included\n",
+                       build["peak_bytes"].get<double>() / 1e6);
     }
     if (!options.out_file.empty()) {
-        save_rdx(options.out_file, timed.bvh, scene);
+        save_rdx(options.out_file, bvh, scene);
         if (options.common.prints_tables()) fmt::print("written      {}\n", options.out_file);
     }
     write_json(document, options.common);

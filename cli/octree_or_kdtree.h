@@ -95,6 +95,7 @@ void run_tree_build(const std::string& scene_name, const TreeOptions& tree_optio
         return build_repeatedly<Kind>(scene.mesh(), options, tree_options.device, repeat);
     });
     Json build = tree_build_json<Kind>(builds.tree, builds.ms);
+    build["repeat"] = repeat;
     build["device"] = tree_options.device;
     TreeFigures figures = Kind::figures(builds.tree);
     if (is_device(tree_options.device))

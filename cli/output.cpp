@@ -94,14 +94,19 @@ Json spread_json(const Spread& spread) {
     return {{"median", spread.median}, {"min", spread.min}, {"max", spread.max}};
 }
 
-Json build_json(const Bvh& bvh, const TreeStats& stats, const std::vector<BuildMs>& builds) {
+Json build_json(const Bvh& bvh, const TreeStats& stats, const std::vector<BuildMs>& builds,
+                std::optional<double> epo_sample) {
     const BuildOptions& options = bvh.options();
     const auto or_null = [](const auto& value) { return value ? Json(*value) : Json(nullptr); };
+    const Json fit = options.fit == Fit::as_published ? Json(nullptr)
+                     : options.fit == Fit::levels     ? "levels"
+                                                      : "atomic";
     Json build{{"tree", "bvh"},
                {"builder", builder_name(options.builder)},
                {"bits", options.bits},
                {"max_leaf", options.max_leaf},
                {"reinsertion_rounds", options.reinsertion_rounds},
+               {"fit", fit},
                {"device", "cpu"},
                {"threads", threads_at_work(options.threads)},
                {"primitives", bvh.input_count()},
@@ -117,6 +122,7 @@ Json build_json(const Bvh& bvh, const TreeStats& stats, const std::vector<BuildM
                {"sah_constants",
                 {{"node", stats.sah_constants.node}, {"primitive", stats.sah_constants.primitive}}},
                {"epo", or_null(stats.epo)},
+               {"epo_sample", or_null(epo_sample)},
                {"bytes", stats.bytes},
                {"bytes_referenced", stats.bytes_referenced},
                {"peak_bytes", builds.empty() ? Json(nullptr) : Json(bvh.peak_bytes())},
@@ -193,6 +199,7 @@ void require_writable_json(const CommonOptions& common) {
 void write_json(const Json& made, const CommonOptions& common) {
     if (common.json_file.empty()) return;
     Json document = made;
+    if (!document.contains("seed")) document["seed"] = common.seed;
     if (common.flattened)
         (document.contains("scene") ? document["scene"] : document)["flattened"] = true;
     const std::string text = document.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";

@@ -7,6 +7,7 @@
 
 #include <array>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -35,7 +36,8 @@ struct Spread {
 /// The `build` object of a document; `builds` are the times of each repeat (empty: a tree from a
 /// file).
 [[nodiscard]] Json build_json(const Bvh& bvh, const TreeStats& stats,
-                              const std::vector<BuildMs>& builds);
+                              const std::vector<BuildMs>& builds,
+                              std::optional<double> epo_sample = {});
 /// Puts `ms` and `ms_spread` of the repeats into a `build` object.
 void add_build_ms(Json& build, const std::vector<BuildMs>& builds);
 /// Of a build, in their order, and all of it.
@@ -55,7 +57,7 @@ void print_tree_table(const Bvh& bvh, const TreeStats& stats);
 
 /// Before the work whose document --json takes. Throws InputError as write_json would.
 void require_writable_json(const CommonOptions& common);
-/// Writes the document if one was asked for. Throws InputError that names the file.
+/// Writes the document, with its seed, if one was asked for. Throws InputError that names the file.
 void write_json(const Json& document, const CommonOptions& common);
 
 /// A bar on standard error after the first second, on a terminal only. It is wiped when it ends,

@@ -95,12 +95,20 @@ void add_mesh_options(CLI::App& command, QueryCommand& options) {
 
 }  // namespace
 
-Json query_json(const QueryFigures& figures) {
+Json query_json(const QueryFigures& figures, const QueryCommand& options) {
     std::vector<double> rates;
     for (const double seconds : figures.seconds)
         rates.push_back(static_cast<double>(figures.queries) / seconds / 1e6);
+    const auto named = [](const std::string& file) {
+        return file.empty() ? Json(nullptr) : Json(file);
+    };
     return {
         {"kind", figures.kind},
+        {"queries_file", named(options.queries_file)},
+        {"with", named(options.with_scene)},
+        {"narrow", options.narrow},
+        {"sort", options.sort},
+        {"repeat", options.repeat},
         {"queries", figures.queries},
         {"invalid_queries", figures.invalid_queries},
         {"found", figures.found},
@@ -153,9 +161,8 @@ void add_query_command(CLI::App& app) {
                      "PREFIX.instances.npy, --pairs PREFIX.pairs-geometries.npy and "
                      "PREFIX.pairs-instances.npy")
         ->type_name("PREFIX");
-    command->add_flag(
-        "--sort", options->sort,
-        "Rows of --radius by distance instead of by index (of --knn they always are)");
+    command->add_flag("--sort", options->sort,
+                      "Rows of --radius by distance instead of by index (of --knn they always are)");
     command->add_option("--tree", options->tree, "How points are grouped; answers are the same")
         ->check(CLI::IsMember({"automatic", "kdtree", "bvh"}))
         ->capture_default_str();

@@ -33,8 +33,8 @@ struct QueryFigures {
     std::vector<double> seconds{};
 };
 
-/// An entry of `query[]`: kind, queries, invalid_queries, found, mqueries_per_s.
-[[nodiscard]] Json query_json(const QueryFigures& figures);
+/// An entry of `query[]`: what was asked, queries, invalid_queries, found, mqueries_per_s.
+[[nodiscard]] Json query_json(const QueryFigures& figures, const QueryCommand& options);
 void print_query(const Json& query);
 
 /// A file, a built-in scene, or the scene of a .rdx file.

@@ -158,7 +158,7 @@ void run_mesh_query(const QueryCommand& options) {
                                              : answer_pairs(options, tree);
         },
         options.queries_file);
-    document["query"] = Json::array({query_json(figures)});
+    document["query"] = Json::array({query_json(figures, options)});
     tell_left_out(document, tree.bvh.left_out(), options.common);
     if (options.common.prints_tables()) {
         if (options.signed_distance) print_solid(document["solid"]);

@@ -172,7 +172,7 @@ void run_scene_query(const QueryCommand& options, const QueriedScene& queried,
                                              : pairs_of_scene(options, queried, other);
         },
         options.queries_file);
-    document["query"] = Json::array({query_json(figures)});
+    document["query"] = Json::array({query_json(figures, options)});
     tell_left_out(document, left_out_triangles(queried.scene), options.common);
     if (options.common.prints_tables()) {
         if (options.signed_distance) print_solid(document["solid"]);

@@ -1,6 +1,7 @@
 // Cameras -> primary rays -> launches of each kind -> the ones that a sample takes.
 #include "ray_launches.h"
 
+#include <fmt/format.h>
 #include <raydix/error.h>
 
 #include <algorithm>
@@ -34,6 +35,14 @@ std::vector<Camera> chosen_cameras(const std::string& which, const Model& scene)
         throw InputError(scene.name + ": camera " + which + " is past the last of " +
                          std::to_string(all.size()) + " cameras");
     return {all[index]};
+}
+
+Json asked_rays_json(const std::string& camera, Size size, int samples,
+                     std::optional<RayKind> kind) {
+    if (!kind) return {{"camera", nullptr}, {"size", nullptr}, {"samples", nullptr}};
+    return {{"camera", camera},
+            {"size", fmt::format("{}x{}", size.width, size.height)},
+            {"samples", kind == RayKind::primary ? Json(nullptr) : Json(samples)}};
 }
 
 Size chosen_size(const LaunchOptions& options, const Model& scene) {

@@ -7,12 +7,14 @@
 #include <raydix/trace.h>
 
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <variant>
 #include <vector>
 
 #include "options.h"
+#include "output.h"
 
 namespace raydix::cli {
 
@@ -24,6 +26,11 @@ struct LaunchOptions {
     std::uint32_t launch_rays = 1u << 20;  // secondary rays of one launch
 };
 void add_launch_options(CLI::App& command, LaunchOptions& options);
+
+/// What a row of a document says of its rays, in the terms of the command line: camera, size and
+/// samples. Null: of no use to them. `kind`: none for rays of a file.
+[[nodiscard]] Json asked_rays_json(const std::string& camera, Size size, int samples,
+                                   std::optional<RayKind> kind);
 
 /// A launch, or a run of neighbouring rays of one.
 struct RayUnit {

@@ -57,6 +57,22 @@ SceneTree load_shown(const RenderCommand& options, std::optional<Scene>& scene, 
     return {std::move(model), {}};
 }
 
+/// What the rays went through, or which boxes are drawn. `quality`: of a scene, else null.
+void add_trees(Json& rendered, const RenderCommand& options, const Json& quality, const Bvh& bvh) {
+    const bool of_tree = is_tree_view(options.view), slice = options.view == "slice";
+    const std::string& cameras = options.tree.cameras_file;
+    rendered["cameras"] = cameras.empty() ? Json(nullptr) : Json(cameras);
+    rendered["threads"] = threads_at_work(options.common.threads);
+    rendered["tree"] = options.tree.tree;
+    rendered["quality"] = quality;
+    const bool of_bvh = quality.is_null() && options.tree.tree == "bvh";
+    rendered["builder"] = of_bvh ? Json(builder_name(bvh.options().builder)) : Json(nullptr);
+    const std::string& levels = options.tree_view.levels;
+    rendered["levels"] = of_tree && !levels.empty() ? Json(levels) : Json(nullptr);
+    rendered["axis"] = slice ? Json(options.tree_view.axis) : Json(nullptr);
+    rendered["at"] = slice ? Json(options.tree_view.at) : Json(nullptr);
+}
+
 void run_render(RenderCommand options) {
     refuse_build_options(options.scene, options.tree);
     refuse_device(options.tree);
@@ -109,6 +125,12 @@ void run_render(RenderCommand options) {
     if (options.view == "slice")
         for (const char* field : {"camera", "eye", "target", "up", "fov"})
             document["render"][field] = nullptr;
+    const Json quality =
+        !scene ? Json(nullptr)
+        : !about_scene.is_null()
+            ? about_scene["quality"]
+            : Json(quality_name(scene_options(options.tree, options.common).quality));
+    add_trees(document["render"], options, quality, input.bvh);
     document["render"]["ms"] = ms;
     write_json(document, options.common);
 }

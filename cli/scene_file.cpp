@@ -62,6 +62,7 @@ void build_scene_file(Model model, const std::string& scene, const std::string& 
         {"layout", layout_name(options)},
         {"device", "cpu"},
         {"threads", threads_at_work(common.threads)},
+        {"repeat", repeat},
         {"paths", report.paths},
         {"ms", {{"total", spread.median}}},
         {"ms_spread", {{"min", {{"total", spread.min}}}, {"max", {{"total", spread.max}}}}}};

@@ -58,8 +58,12 @@ void run_simulate(const SimulateCommand& options) {
     document["load_ms"] = input.scene.load_ms;
     const std::vector<BuildMs> builds =
         is_rdx(options.scene) ? std::vector<BuildMs>{} : std::vector{input.bvh.build_ms()};
-    document["build"] = build_json(
-        input.bvh, tree_stats(input.bvh, stats_options(options.tree, options.common)), builds);
+    document["build"] =
+        build_json(input.bvh, tree_stats(input.bvh, stats_options(options.tree, options.common)),
+                   builds, options.tree.epo_sample);
+    const std::string& cameras = options.tree.cameras_file;
+    document["cameras"] = cameras.empty() ? Json(nullptr) : Json(cameras);
+    document["memory"] = options.memory;
     document["machines"] = Json::array({machine_model_json(machine)});
     document["simulate"] = Json::array();
     about(options.scene, [&] {

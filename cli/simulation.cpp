@@ -216,6 +216,16 @@ void know_all_launches(const WarpTree& tree, const RayLaunches& launches, const 
 
 }  // namespace
 
+Json asked_launches_json(const SceneTree& input, const RayLaunches& launches, RayKind kind,
+                         const LaunchOptions& options) {
+    Json asked =
+        asked_rays_json(options.camera, chosen_size(options, input.scene), options.samples, kind);
+    const bool secondary = kind != RayKind::primary;
+    asked["ao_radius"] = kind == RayKind::ao ? Json(launches.ao_radius()) : Json(nullptr);
+    asked["launch_rays"] = secondary ? Json(options.launch_rays) : Json(nullptr);
+    return asked;
+}
+
 std::vector<SimulationRow> simulate_kind(const SceneTree& input, const WarpTree& tree,
                                          const RayLaunches& launches, RayKind kind,
                                          std::vector<SimulateOptions> runs,
@@ -230,6 +240,7 @@ std::vector<SimulationRow> simulate_kind(const SceneTree& input, const WarpTree&
                         .options = run,
                         .sum = {},
                         .builder = std::string(builder_name(input.bvh.options().builder)),
+                        .asked = asked_launches_json(input, launches, kind, options),
                         .sample = options.sample,
                         .units = {}});
     }
@@ -272,6 +283,7 @@ std::vector<SimulationRow> simulate_rays(const SceneTree& input, const WarpTree&
                         .options = run,
                         .sum = {},
                         .builder = std::string(builder_name(input.bvh.options().builder)),
+                        .asked = asked_rays_json({}, {}, 0, std::nullopt),
                         .units = {}});
     add_unit(tree, {rays, 1.0}, runs, rows, common);
     const std::uint64_t invalid = count_invalid_rays(rays, common.threads);
@@ -309,39 +321,41 @@ Json simulation_json(const SimulationRow& row) {
     const bool any = row.sum.instructions > 0;
     const auto rays = static_cast<double>(row.sum.rays);
     const std::optional<double> error = row.sampling_error();
-    return {{"scene", row.scene},
-            {"kernel", warp_kernel_name(row.options.kernel)},
-            {"rays", row.rays},
-            {"mode", row.options.any_hit ? "any" : "closest"},
-            {"machine", row.options.machine.name},
-            {"builder", row.builder},
-            {"device", "sim"},
-            {"simulated", true},
-            {"width", row.options.width},
-            {"count", row.sum.rays},
-            {"launches", row.sum.launches},
-            {"hits", row.sum.hits},
-            {"different_hits", row.different_hits},
-            {"invalid_rays", row.invalid_rays},
-            {"mrays_per_s_bound", or_null(any, rates.bound)},
-            {"mrays_per_s_scheduled", or_null(any && row.whole_launches, rates.scheduled)},
-            {"mrays_per_s_single_warps", or_null(any && row.whole_launches, rates.single_warps)},
-            {"mrays_per_s_free_blocks", or_null(any && row.whole_launches, rates.free_blocks)},
-            {"mrays_per_s_memory", or_null(any && row.has_memory(), rates.memory)},
-            {"memory_limit", any && row.has_memory() ? Json(rates.memory_limit) : Json(nullptr)},
-            {"memory_limits", memory_limits_json(row)},
-            {"simd_efficiency", or_null(any, rates.simd_efficiency)},
-            {"issues_per_ray", or_null(any, static_cast<double>(row.sum.instructions) / rays)},
-            {"instructions_per_ray",
-             or_null(any, static_cast<double>(row.sum.lane_instructions) / rays)},
-            {"idle_share", or_null(any && row.whole_launches && row.sum.issue_slots > 0,
-                                   row.sum.idle_issues / row.sum.issue_slots)},
-            {"sample", row.sample},
-            {"part_taken", row.part_taken},
-            {"sampling_error", error ? Json(*error) : Json(nullptr)},
-            {"correction", row.correction()},
-            {"operations", operations_json(row)},
-            {"histogram", histogram_json(row.sum)}};
+    Json json{{"scene", row.scene},
+              {"kernel", warp_kernel_name(row.options.kernel)},
+              {"rays", row.rays},
+              {"mode", row.options.any_hit ? "any" : "closest"},
+              {"machine", row.options.machine.name},
+              {"builder", row.builder},
+              {"device", "sim"},
+              {"simulated", true},
+              {"width", row.options.width},
+              {"count", row.sum.rays},
+              {"launches", row.sum.launches},
+              {"hits", row.sum.hits},
+              {"different_hits", row.different_hits},
+              {"invalid_rays", row.invalid_rays},
+              {"mrays_per_s_bound", or_null(any, rates.bound)},
+              {"mrays_per_s_scheduled", or_null(any && row.whole_launches, rates.scheduled)},
+              {"mrays_per_s_single_warps", or_null(any && row.whole_launches, rates.single_warps)},
+              {"mrays_per_s_free_blocks", or_null(any && row.whole_launches, rates.free_blocks)},
+              {"mrays_per_s_memory", or_null(any && row.has_memory(), rates.memory)},
+              {"memory_limit", any && row.has_memory() ? Json(rates.memory_limit) : Json(nullptr)},
+              {"memory_limits", memory_limits_json(row)},
+              {"simd_efficiency", or_null(any, rates.simd_efficiency)},
+              {"issues_per_ray", or_null(any, static_cast<double>(row.sum.instructions) / rays)},
+              {"instructions_per_ray",
+               or_null(any, static_cast<double>(row.sum.lane_instructions) / rays)},
+              {"idle_share", or_null(any && row.whole_launches && row.sum.issue_slots > 0,
+                                     row.sum.idle_issues / row.sum.issue_slots)},
+              {"sample", row.sample},
+              {"part_taken", row.part_taken},
+              {"sampling_error", error ? Json(*error) : Json(nullptr)},
+              {"correction", row.correction()},
+              {"operations", operations_json(row)},
+              {"histogram", histogram_json(row.sum)}};
+    json.update(row.asked);
+    return json;
 }
 
 Json machine_model_json(const MachineModel& m) {

@@ -34,6 +34,7 @@ struct SimulationRow {
     SimulateOptions options;
     Simulation sum;
     std::string builder = {};                          // of the tree
+    Json asked = {};                                   // asked_rays_json, ao_radius, launch_rays
     double sample = 1.0;                               // as asked for
     double part_taken = 1.0;                           // of all rays
     bool whole_launches = true;                        // else there is no launch to schedule
@@ -87,6 +88,10 @@ struct SimulationEnd {
 
 /// The simulator leaves these out without a word.
 [[nodiscard]] std::uint64_t count_invalid_rays(std::span<const Ray> rays, int threads);
+
+/// Of the rays of one kind: which they are.
+[[nodiscard]] Json asked_launches_json(const SceneTree& input, const RayLaunches& launches,
+                                       RayKind kind, const LaunchOptions& options);
 
 [[nodiscard]] Json simulation_json(const SimulationRow& row);
 [[nodiscard]] Json machine_model_json(const MachineModel& machine);

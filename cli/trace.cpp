@@ -274,6 +274,18 @@ Json rates_json(const Tally& tally, const std::vector<double>& all_seconds) {
     return rates.empty() ? Json(nullptr) : spread_json(spread_of(rates));
 }
 
+/// Which rays they were, and how they went, in the terms of the command line.
+Json asked_json(const TraceCommand& options, Size size) {
+    const bool from_file = options.rays.ends_with(".npy");
+    Json asked = asked_rays_json(options.camera, size, options.samples,
+                                 from_file ? std::nullopt : std::optional(ray_kind(options.rays)));
+    const std::string& cameras = options.tree.cameras_file;
+    asked["cameras"] = from_file || cameras.empty() ? Json(nullptr) : Json(cameras);
+    asked["repeat"] = options.repeat;
+    asked["path"] = options.kernel == "engine" ? Json(options.wide.path) : Json(nullptr);
+    return asked;
+}
+
 Json trace_json(const TraceCommand& options, const std::string& mode, const Tally& tally,
                 const WarpTracer* warps, bool counts_visits) {
     const auto per_ray = [&](std::uint64_t n) {
@@ -480,11 +492,12 @@ void run_trace(const TraceCommand& given) {
         : through_kdtree
             ? kdtree_json(*traced.kdtree, {traced.kdtree->build_ms()})
             : build_json(input.bvh,
-                         tree_stats(input.bvh, stats_options(options.tree, options.common)),
-                         builds);
-    if (wide) add_wide(document["build"], wide->tree());
+                         tree_stats(input.bvh, stats_options(options.tree, options.common)), builds,
+                         options.tree.epo_sample);
+    if (wide) add_traced_wide(document["build"], input.bvh, wide->tree(), builds);
     document["trace"] =
         Json::array({trace_json(options, mode_text(mode), tally, batch.warps, !warps && !scene)});
+    document["trace"][0].update(asked_json(options, size));
     if (wide) {
         document["trace"][0]["isa"] = wide->isa();
         document["trace"][0]["paths"] = wide->paths_json();

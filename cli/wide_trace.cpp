@@ -4,6 +4,8 @@
 
 #include <CLI/CLI.hpp>
 
+#include "layout_builds.h"
+
 namespace raydix::cli {
 
 void add_wide_trace_options(CLI::App& command, WideTraceOptions& options) {
@@ -142,25 +144,17 @@ void add_wide(Json& build, const WideBvh& tree) {
                      {"kept_ms", nullptr}};
 }
 
-void add_wide_builds(Json& build, const Mesh& mesh, const BuildOptions& options,
-                     const std::string& layout, int repeat) {
-    const WideBvhOptions wide = wide_options(layout, options.threads);
-    std::vector<double> fresh, kept;
-    WideBvh tree = about(mesh.name, [&] { return build_wide_bvh(mesh, options, wide); });
-    for (int i = 0; i < repeat; ++i) {
-        tree = WideBvh();
-        tree = build_wide_bvh(mesh, options, wide);
-        fresh.push_back(tree.stats().ms);
-    }
-    WideBvhBuilder builder;
-    builder.build(mesh, options, tree, wide);
-    for (int i = 0; i < repeat; ++i) {
-        builder.build(mesh, options, tree, wide);
-        kept.push_back(tree.stats().ms);
-    }
+void add_traced_wide(Json& build, const Bvh& bvh, const WideBvh& tree,
+                     const std::vector<BuildMs>& builds) {
+    const WideBvhStats& s = tree.stats();
+    TimedBuilds timed;
+    for (const BuildMs& of_tree : builds) timed.fresh.push_back(with_layout(of_tree, s.ms));
+    timed.peak_bytes = peak_with_layout(bvh, s.peak_bytes);
+    if (!builds.empty()) keep_binary(build);
     add_wide(build, tree);
-    build["wide"]["build_ms"] = spread_json(spread_of(fresh));
-    build["wide"]["kept_ms"] = spread_json(spread_of(kept));
+    if (builds.empty()) return;
+    set_layout_builds(build, timed);
+    build["wide"]["build_ms"] = spread_json(totals(timed.fresh));
 }
 
 void print_wide_table(const Json& wide) {
@@ -169,13 +163,6 @@ void print_wide_table(const Json& wide) {
                wide["children_per_node"].get<double>(),
                grouped(wide["leaves"].get<std::uint64_t>()),
                wide["max_depth"].get<std::uint32_t>());
-    for (const auto& [label, field] :
-         {std::pair{"from the mesh", "build_ms"}, {"rebuild", "kept_ms"}})
-        if (const Json& ms = wide[field]; ms.is_object())
-            fmt::print(
-                "{:<13} {:>8.2f} {:>9.2f} {:>9.2f}   ms: median, min, max; all that rays need\n",
-                label, ms["median"].get<double>(), ms["min"].get<double>(),
-                ms["max"].get<double>());
     fmt::print(
         "SAH          {:.3f}   (node 1, primitive 0.4), boxes widened to {:.3f} x their area\n",
         wide["sah"].get<double>(), wide["widening"].get<double>());

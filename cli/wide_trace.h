@@ -5,6 +5,7 @@
 
 #include <map>
 #include <string>
+#include <vector>
 
 #include "options.h"
 #include "output.h"
@@ -57,10 +58,10 @@ private:
 
 /// The wide tree; what a trace touches is then its.
 void add_wide(Json& build, const WideBvh& tree);
-/// Times builds of it, into new memory and into kept memory, without the binary tree where that is
-/// possible; then as add_wide.
-void add_wide_builds(Json& build, const Mesh& mesh, const BuildOptions& options,
-                     const std::string& layout, int repeat);
+/// The same in a document of `trace`, whose times and peak then have the layout in them. No builds:
+/// the binary tree comes from a file.
+void add_traced_wide(Json& build, const Bvh& bvh, const WideBvh& tree,
+                     const std::vector<BuildMs>& builds);
 void print_wide_table(const Json& wide);
 
 }  // namespace raydix::cli

@@ -26,6 +26,8 @@ struct CwbvhStats {
     std::uint64_t node_bytes = 0, triangle_bytes = 0;
     std::uint64_t bytes = 0;        // every byte a trace touches
     double bytes_per_triangle = 0;  // bytes / triangles
+    std::uint64_t peak_bytes = 0;   // most bytes that making it took at once, this tree included,
+                                    // above those that were held before
 };
 
 /// Holds all that a trace reads: the binary tree may go. Children are chosen by dynamic programming

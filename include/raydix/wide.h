@@ -37,8 +37,11 @@ struct WideBvhStats {
         0;  // surface of all quantised child boxes / that of the exact ones; 1 without surface
     std::uint64_t node_bytes = 0, triangle_bytes = 0;  // vertices are among the latter
     std::uint64_t bytes = 0;                           // every byte a trace touches
-    double ms = 0;         // of making it: from a binary tree, or from a mesh
-    double layout_ms = 0;  // the part of it after the binary tree or its clusters
+    double ms = 0;                 // of making it: from a binary tree, or from a mesh
+    double layout_ms = 0;          // the part of it after the binary tree or its clusters
+    BuildMs stages{};              // of ms; `layout` is all that the stages before it leave
+    std::uint64_t peak_bytes = 0;  // most bytes that making it took at once, this tree included,
+                                   // above those that were held before
     std::uint64_t input_count = 0, left_out = 0;  // triangles given; invalid ones among them
 };
 

@@ -8,6 +8,7 @@
 #include "base/float_env.h"
 #include "base/math.h"
 #include "base/options.h"
+#include "exec/memory.h"
 #include "exec/parallel.h"
 #include "layout/cwbvh.h"
 #include "layout/wide_collapse.h"
@@ -69,11 +70,14 @@ Cwbvh::Cwbvh(const Bvh& bvh, int threads) : arrays_(std::make_unique<Arrays>()) 
                          (bvh.kind() == PrimitiveKind::points ? "points" : "boxes"));
     const FloatEnvironment environment;
     const WideOptions options{.width = cwbvh_width, .max_leaf = cwbvh_max_leaf};
+    const std::uint64_t before = memory_count().now();
+    memory_count().restart_peak();
     with_threads(threads, [&] {
         const WideTree wide = collapse_to_wide(bvh, options);
         compress_wide_tree(wide, bvh, *arrays_);
         arrays_->stats = stats_of(wide, options, bvh, *arrays_);
     });
+    arrays_->stats.peak_bytes = memory_count().peak() - before;
 }
 
 Cwbvh::~Cwbvh() = default;

@@ -8,6 +8,7 @@
 #include "base/options.h"
 #include "build/bvh_builder_internals.h"
 #include "exec/large_pages.h"
+#include "exec/memory.h"
 #include "exec/parallel.h"
 #include "exec/progress.h"
 #include "layout/cluster_view.h"
@@ -33,6 +34,19 @@ WideOptions collapse_options(const WideBvhOptions& options) {
     return collapse;
 }
 
+std::uint64_t peak_above(std::uint64_t before) {
+    const std::uint64_t peak = memory_count().peak();
+    return peak > before ? peak - before : 0;  // kept memory may have been given back
+}
+
+/// `of_tree`: of a build of the binary tree, or of what stands in its place.
+BuildMs with_layout(BuildMs of_tree, double total) {
+    of_tree.layout =
+        total - of_tree.bounds - of_tree.codes - of_tree.sort - of_tree.hierarchy - of_tree.fit;
+    of_tree.total = total;
+    return of_tree;
+}
+
 /// Whether nodes and blocks are written from sorted triangles, without a binary tree between.
 bool goes_straight(const BuildOptions& options, const WideBvhOptions& wide) {
     return options.builder == Builder::apetrei && options.reinsertion_rounds == 0 &&
@@ -52,14 +66,18 @@ WideBvh::WideBvh(const Bvh& bvh, const WideBvhOptions& options)
         throw InputError(std::string("rays need triangles; this tree holds ") +
                          (bvh.kind() == PrimitiveKind::points ? "points" : "boxes"));
     const FloatEnvironment environment;
+    const std::uint64_t before = memory_count().now();
+    memory_count().restart_peak();
     with_threads(options.threads, [&] {
         const LargePages large;
         Stopwatch watch;
         WideScratch scratch;
         make_wide_layout(bvh, collapse, *arrays_, scratch);
         settle_local_pads(*arrays_);
-        arrays_->stats.ms = arrays_->stats.layout_ms = watch.lap();
+        WideBvhStats& stats = arrays_->stats;
+        stats.ms = stats.layout_ms = stats.stages.layout = stats.stages.total = watch.lap();
     });
+    arrays_->stats.peak_bytes = peak_above(before);
 }
 
 WideBvh::WideBvh() : arrays_(std::make_unique<Arrays>()) { arrays_->clear({}); }
@@ -94,6 +112,8 @@ void WideBvhBuilder::build(const MeshView& mesh, const BuildOptions& options, Wi
     if (!scratch_) scratch_ = std::make_unique<Scratch>();
     WideBvh::Arrays& arrays = *tree.arrays_;
     Bvh& bvh = scratch_->tree;
+    const std::uint64_t before = memory_count().now();
+    bool by_clusters = false;
     double layout_ms = 0;
     const auto lay_out = [&](const auto& make) {
         Stopwatch stage;
@@ -104,6 +124,7 @@ void WideBvhBuilder::build(const MeshView& mesh, const BuildOptions& options, Wi
         arrays.clear(collapse);
         if (grows_clusters(options.builder) &&
             options.max_leaf <= static_cast<int>(wide_max_leaf)) {
+            by_clusters = true;
             BvhBuilderInternals::build_clusters(
                 scratch_->builder, mesh, options, bvh,
                 [&](const ClusterTree& clusters, const TriangleSource& source,
@@ -145,6 +166,10 @@ void WideBvhBuilder::build(const MeshView& mesh, const BuildOptions& options, Wi
     settle_local_pads(arrays);
     arrays.stats.layout_ms = layout_ms;
     arrays.stats.ms = watch.lap();
+    BuildMs of_tree = bvh.build_ms();
+    if (by_clusters) of_tree.fit = 0;  // the layout was made there
+    arrays.stats.stages = with_layout(of_tree, arrays.stats.ms);
+    arrays.stats.peak_bytes = peak_above(before);
 }
 
 WideBvh build_wide_bvh(const MeshView& mesh, const BuildOptions& options,

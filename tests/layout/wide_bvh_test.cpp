@@ -248,6 +248,32 @@ TEST(WideBuild, OfManyPartsHoldsEveryTriangleInItsBoxes) {
     EXPECT_EQ(walk.deepest, tree.stats().max_depth);
 }
 
+TEST(WideBuild, StagesMakeUpTheTimeAndThePeakHoldsTheTree) {
+    const Mesh mesh = random_soup(20'000, 8);
+    for (const Builder builder :
+         {Builder::karras, Builder::apetrei, Builder::ploc, Builder::binned, Builder::sweep})
+        for (const bool compact : {false, true}) {
+            BuildOptions options;
+            options.builder = builder;
+            const WideBvhStats s = build_wide_bvh(mesh, options, {.compact = compact}).stats();
+            const BuildMs& ms = s.stages;
+            SCOPED_TRACE(builder_name(builder));
+            EXPECT_DOUBLE_EQ(ms.total, s.ms);
+            EXPECT_NEAR(ms.bounds + ms.codes + ms.sort + ms.hierarchy + ms.fit + ms.layout,
+                        ms.total, 1e-9);
+            EXPECT_GE(ms.layout, s.layout_ms);
+            EXPECT_GT(ms.sort, 0);
+            EXPECT_GE(s.peak_bytes, s.bytes);
+        }
+    const WideBvhStats s = WideBvh(build_bvh(mesh)).stats();
+    EXPECT_EQ(s.stages.layout, s.ms);
+    EXPECT_EQ(s.stages.total, s.ms);
+    EXPECT_GE(s.peak_bytes, s.bytes);
+    const WideBvhStats none = build_wide_bvh(Mesh{}).stats();
+    EXPECT_EQ(none.stages.hierarchy, 0);
+    EXPECT_EQ(none.bytes, 0u);
+}
+
 TEST(WideBuild, LeavesOutWhatIsInvalidOrFlat) {
     Mesh mesh = random_soup(20'000, 8);
     for (std::size_t k = 0; k < 20'000; k += 7) mesh.vertices[mesh.triangles[k][0]].x = NAN;
