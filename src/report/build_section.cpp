@@ -33,16 +33,22 @@ std::string device_of(const Json& build) {
     return device == "cpu" && threads ? counted(*threads, "thread") : device;
 }
 
-/// Tree, builder and settings, as texts to put beside each other.
-std::vector<std::string> parts_of(const Json& build) {
+/// Whether rows that differ in nothing but the layout are told apart.
+enum class Layouts { apart, together };
+
+/// Tree, builder, settings and layout, as texts to put beside each other.
+std::vector<std::string> parts_of(const Json& build, Layouts layouts) {
     std::vector<std::string> parts{text_at(build, "tree"), text_at(build, "builder")};
     if (parts[0] == "bvh") parts[0].clear();
     for (const std::string& setting : tree_settings(build)) parts.push_back(setting);
+    const std::string layout = text_at(build, "layout");
+    const bool is_told = layouts == Layouts::apart && !layout.empty() && layout != "binary";
+    parts.push_back(is_told ? layout + " layout" : "");
     parts.push_back(device_of(build));
     return parts;
 }
 
-void name_rows(std::vector<BuildRow>& rows) {
+void name_rows(std::vector<BuildRow>& rows, Layouts layouts) {
     for (BuildRow& row : rows) {
         if (!row.name.empty()) continue;
         std::vector<BuildRow*> group;
@@ -51,7 +57,7 @@ void name_rows(std::vector<BuildRow>& rows) {
         for (BuildRow& other : rows)
             if (other.scene == row.scene) {
                 group.push_back(&other);
-                parts.push_back(parts_of(*other.build));
+                parts.push_back(parts_of(*other.build, layouts));
                 sources.push_back(other.document->name);
             }
         Names names = distinct_names(parts, 1);
@@ -83,16 +89,18 @@ std::vector<BuildRow> rows_of(const Documents& documents) {
     return rows;
 }
 
-/// Each tree once: every trace of a scene brings the same one again.
-std::vector<BuildRow> different_trees(const std::vector<BuildRow>& rows) {
+/// Each tree once, or in each of its layouts: every trace of a scene brings the same one again.
+std::vector<BuildRow> different_trees(const std::vector<BuildRow>& rows, Layouts layouts) {
     std::vector<BuildRow> trees;
     std::set<std::vector<std::string>> seen;
     for (const BuildRow& row : rows) {
-        std::vector<std::string> identity = parts_of(*row.build);
+        std::vector<std::string> identity = parts_of(*row.build, layouts);
         identity.push_back(row.scene);
         identity.push_back(text_at(*row.build, "tree_hash"));
+        if (layouts == Layouts::apart) identity.push_back(text_at(*row.build, "bytes"));
         if (seen.insert(identity).second) trees.push_back(row);
     }
+    name_rows(trees, layouts);
     return trees;
 }
 
@@ -213,6 +221,7 @@ std::string time_table(const std::vector<BuildRow>& rows) {
                             {"bits", Format::integer},
                             {"leaves of", Format::integer},
                             {"reinsertion", Format::integer, "rounds"},
+                            {"layout"},
                             {"device"},
                             {"total", Format::number, "ms, median"},
                             {"least", Format::number, "ms"},
@@ -230,12 +239,12 @@ std::string time_table(const std::vector<BuildRow>& rows) {
         std::optional<double> ratio, rate;
         if (fastest > 0) ratio = *row.total / fastest;
         if (row.primitives && *row.total > 0) rate = *row.primitives / *row.total / 1e3;
-        table.rows.push_back({text_at(*row.build, "builder"), row.scene,
-                              text_at(*row.build, "tree"), number_at(*row.build, "bits"),
-                              number_at(*row.build, "max_leaf"),
-                              number_at(*row.build, "reinsertion_rounds"), row.device, row.total,
-                              row.low, row.high, ratio, spread_at(*row.build, "kept_ms").median,
-                              rate, number_at(row.document->root, "load_ms"), row.document->name});
+        table.rows.push_back(
+            {text_at(*row.build, "builder"), row.scene, text_at(*row.build, "tree"),
+             number_at(*row.build, "bits"), number_at(*row.build, "max_leaf"),
+             number_at(*row.build, "reinsertion_rounds"), text_at(*row.build, "layout"), row.device,
+             row.total, row.low, row.high, ratio, spread_at(*row.build, "kept_ms").median, rate,
+             number_at(row.document->root, "load_ms"), row.document->name});
     }
     table.drop_empty_columns();
     return table_html(table);
@@ -252,6 +261,7 @@ std::string tree_table(const std::vector<BuildRow>& trees) {
                             {"bits", Format::integer},
                             {"leaves of", Format::integer},
                             {"reinsertion", Format::integer, "rounds"},
+                            {"layout"},
                             {"device"},
                             {"primitives", Format::integer},
                             {"left out", Format::integer},
@@ -283,6 +293,7 @@ std::string tree_table(const std::vector<BuildRow>& trees) {
                               number_at(b, "bits"),
                               number_at(b, "max_leaf"),
                               number_at(b, "reinsertion_rounds"),
+                              text_at(b, "layout"),
                               row.device,
                               row.primitives,
                               number_at(b, "left_out"),
@@ -298,6 +309,51 @@ std::string tree_table(const std::vector<BuildRow>& trees) {
                               mega("peak_bytes"),
                               hash});
     }
+    table.drop_empty_columns();
+    return table_html(table);
+}
+
+/// Figures of layouts other than the binary one; "" if there are none.
+std::string layout_table(const std::vector<BuildRow>& trees) {
+    Table table{.title = "Wide layouts",
+                .note =
+                    "What rays go through where the layout is not binary. Times are medians, from "
+                    "the mesh to the layout. SAH is 1 a node and 0.4 a triangle, of cwbvh 1 and 1.",
+                .columns = {{"tree"},
+                            {"scene"},
+                            {"layout"},
+                            {"nodes", Format::integer},
+                            {"leaves", Format::integer},
+                            {"references", Format::integer},
+                            {"depth", Format::integer},
+                            {"children", Format::number, "per node"},
+                            {"SAH", Format::number},
+                            {"boxes widened", Format::ratio, "of their area"},
+                            {"nodes", Format::number, "MB"},
+                            {"triangles", Format::number, "MB"},
+                            {"build", Format::number, "ms", Origin::measured},
+                            {"into kept memory", Format::number, "ms", Origin::measured},
+                            {"layout alone", Format::number, "ms", Origin::measured},
+                            {"binary tree alone", Format::number, "ms", Origin::measured}}};
+    for (const BuildRow& row : trees)
+        for (const char* field : {"wide", "cwbvh"}) {
+            const Json& w = at(*row.build, field);
+            if (!w.is_object()) continue;
+            const bool is_wide = std::string(field) == "wide";
+            const auto mega = [&](const char* name) -> std::optional<double> {
+                const auto bytes = number_at(w, name);
+                return bytes ? std::optional(*bytes / 1e6) : std::nullopt;
+            };
+            table.rows.push_back(
+                {row.name, row.scene, text_at(*row.build, "layout"), number_at(w, "nodes"),
+                 number_at(w, "leaves"), number_at(w, "references"), number_at(w, "max_depth"),
+                 number_at(w, "children_per_node"), number_at(w, "sah"), number_at(w, "widening"),
+                 mega("node_bytes"), mega("triangle_bytes"),
+                 is_wide ? spread_at(w, "build_ms").median : row.total,
+                 spread_at(is_wide ? w : *row.build, "kept_ms").median,
+                 number_at(w, is_wide ? "layout_ms" : "ms"),
+                 number_at(*row.build, "binary.ms.total")});
+        }
     table.drop_empty_columns();
     return table_html(table);
 }
@@ -380,20 +436,21 @@ Section build_section(const Documents& documents, PageColours& colours) {
     const std::vector<BuildRow> all = rows_of(documents);
     std::vector<BuildRow> built = all;
     std::erase_if(built, [](const BuildRow& row) { return row.document->command != "build"; });
-    name_rows(built);
+    name_rows(built, Layouts::apart);
     std::string plots;
     for (const std::string& scene : scenes_of(built)) {
         const std::vector<BuildRow> rows = rows_of_scene(built, scene);
         plots += stage_plot(rows, colours) + quality_plot(rows, colours);
         say_times(scene, rows, section);
     }
-    std::vector<BuildRow> trees = different_trees(all);
-    name_rows(trees);
+    // Costs and hashes are those of the binary tree, whatever the layout.
+    const std::vector<BuildRow> trees = different_trees(all, Layouts::together),
+                                laid_out = different_trees(all, Layouts::apart);
     for (const std::string& scene : scenes_of(trees))
         say_quality(scene, rows_of_scene(trees, scene), section);
     plots += level_plot(built);
     if (!plots.empty()) section.html = "<div class=\"plots\">" + plots + "</div>\n";
-    section.html += time_table(built) + tree_table(trees);
+    section.html += time_table(built) + tree_table(laid_out) + layout_table(laid_out);
     return section;
 }
 

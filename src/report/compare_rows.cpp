@@ -20,20 +20,71 @@ std::string key_of(const Json& row, const std::vector<const char*>& fields, std:
     return key;
 }
 
+/// Of the documents of each command: what the scene is, as far as they say.
+Settings scene_work(const Document& document, const std::string& scene) {
+    Settings work{{"triangles", setting_at(document.root, "scene.triangles")}};
+    if (scene.starts_with("builtin:")) work.emplace_back("seed", setting_at(document.root, "seed"));
+    return work;
+}
+
+/// Which rays a row of `trace` or `simulate` is about.
+Settings ray_work(const Document& document, const Json& row, const std::string& scene) {
+    Settings work = scene_work(document, scene);
+    for (const char* field : {"camera", "size", "samples", "ao_radius"})
+        work.emplace_back(field, setting_at(row, field));
+    // Null means those of the scene; where there is no such field nothing is known.
+    for (const Json* holder : {&row, &document.root})
+        if (holder->contains("cameras")) {
+            const std::string file = setting_at(*holder, "cameras");
+            work.emplace_back("cameras", file.empty() ? "those of the scene" : file);
+            break;
+        }
+    const bool by_chance = !setting_at(row, "samples").empty();
+    if (by_chance && !scene.starts_with("builtin:"))
+        work.emplace_back("seed", setting_at(document.root, "seed"));
+    return work;
+}
+
 void add(CompareRow& row, Measure measure) {
     if (measure.value.median) row.measures.push_back(std::move(measure));
 }
 
+/// Documents of before `build.binary` have the times of the binary tree alone, whatever the layout.
+Settings work_of_times(const Json& build) {
+    const std::string layout = text_at(build, "layout");
+    if (layout.empty() || layout == "binary" || at(build, "builder").is_null()) return {};
+    const bool is_in = at(build, "binary").is_object();
+    return {{"whether the layout is in the times", is_in ? "yes" : "no"}};
+}
+
+/// SAH and EPO are sums over costs and triangles that the run was told.
+Settings work_of_figure(const Json& build, const std::string& field) {
+    if (field == "peak_bytes") return work_of_times(build);
+    if (field == "sah")
+        return {{"sah_node", setting_at(build, "sah_constants.node")},
+                {"sah_primitive", setting_at(build, "sah_constants.primitive")}};
+    if (field == "epo")
+        return {{"epo_sample", setting_at(build, "epo_sample")},
+                {"sah_node", setting_at(build, "sah_constants.node")},
+                {"sah_primitive", setting_at(build, "sah_constants.primitive")}};
+    return {};
+}
+
 CompareRow build_row(const Document& document) {
     const Json& b = at(document.root, "build");
-    CompareRow row{scene_name(document.root) + ", " + text_at(b, "tree"), {}};
+    CompareRow row{scene_name(document.root) + ", " + text_at(b, "tree"),
+                   {},
+                   scene_work(document, scene_name(document.root))};
     for (const char* stage : {"total", "bounds", "codes", "sort", "hierarchy", "fit", "layout"}) {
         const std::string name = stage;
         const SpreadFields ms{number_at(b, "ms." + name), number_at(b, "ms_spread.min." + name),
                               number_at(b, "ms_spread.max." + name)};
-        add(row, {"build, " + name, "ms", Better::lower, Origin::measured, ms});
+        const bool has_layout = name == "total" || name == "layout";
+        add(row, {"build, " + name, "ms", Better::lower, Origin::measured, ms, true,
+                  has_layout ? work_of_times(b) : Settings{}});
     }
-    add(row, {"into kept memory", "ms", Better::lower, Origin::measured, spread_at(b, "kept_ms")});
+    add(row, {"into kept memory", "ms", Better::lower, Origin::measured, spread_at(b, "kept_ms"),
+              true, work_of_times(b)});
     struct Count {
         const char *field, *name, *unit;
         Better better;
@@ -44,18 +95,28 @@ CompareRow build_row(const Document& document) {
           Count{"peak_bytes", "peak of the build", "bytes", Better::lower},
           Count{"nodes", "nodes", "", Better::neither},
           Count{"max_depth", "depth", "", Better::neither}})
-        add(row, {count.name, count.unit, count.better, Origin::none, spread_at(b, count.field)});
+        add(row, {count.name, count.unit, count.better, Origin::none, spread_at(b, count.field),
+                  true, work_of_figure(b, count.field)});
     return row;
 }
 
 void trace_rows(const Document& document, std::vector<CompareRow>& rows) {
     for (const Json* t : objects_at(document.root, "trace")) {
         CompareRow row{key_of(*t, {"rays", "mode", "kernel", "device"}, scene_name(document.root)),
-                       {}};
+                       {},
+                       ray_work(document, *t, scene_name(document.root))};
+        row.work.emplace_back("number of rays", setting_at(*t, "count"));
+        const std::string layout = text_at(document.root, "build.layout");
         add(row,
             {"rate", "Mrays/s", Better::higher, Origin::measured, spread_at(*t, "mrays_per_s")});
-        add(row, {"node visits", "per ray", Better::lower, Origin::none,
-                  spread_at(*t, "node_visits_per_ray")});
+        // Nodes of another width are other work.
+        add(row, {"node visits",
+                  "per ray",
+                  Better::lower,
+                  Origin::none,
+                  spread_at(*t, "node_visits_per_ray"),
+                  true,
+                  {{"layout", layout}}});
         add(row, {"triangle tests", "per ray", Better::lower, Origin::none,
                   spread_at(*t, "triangle_tests_per_ray")});
         add(row, {"hits", "", Better::neither, Origin::none, spread_at(*t, "hits")});
@@ -81,7 +142,9 @@ Measure simulated_measure(const Json& row, Measure measure, const char* field) {
 void simulate_rows(const Document& document, std::vector<CompareRow>& rows) {
     for (const Json* s : objects_at(document.root, "simulate")) {
         const std::string scene = scene_name(at(*s, "scene").is_null() ? document.root : *s);
-        CompareRow row{key_of(*s, {"kernel", "rays", "mode", "machine", "width"}, scene), {}};
+        CompareRow row{key_of(*s, {"kernel", "rays", "mode", "machine", "width"}, scene),
+                       {},
+                       ray_work(document, *s, scene)};
         const auto put = [&](const char* name, const char* unit, Better better, const char* field) {
             add(row, simulated_measure(*s, {name, unit, better, {}, {}}, field));
         };
@@ -95,7 +158,9 @@ void simulate_rows(const Document& document, std::vector<CompareRow>& rows) {
         rows.push_back(std::move(row));
     }
     for (const Json* m : objects_at(document.root, "measured")) {
-        CompareRow row{key_of(*m, {"kernel", "rays", "device"}, scene_name(*m)) + ", measured", {}};
+        CompareRow row{key_of(*m, {"kernel", "rays", "device"}, scene_name(*m)) + ", measured",
+                       {},
+                       ray_work(document, *m, scene_name(*m))};
         add(row,
             {"rate", "Mrays/s", Better::higher, Origin::measured, spread_at(*m, "mrays_per_s")});
         rows.push_back(std::move(row));
@@ -145,36 +210,13 @@ std::vector<CompareRow> compare_rows(const Document& document) {
     return rows;
 }
 
-namespace {
-
-/// The values of a field over all rows, each once: "0.003, 1".
-std::string values_of(const std::vector<const Json*>& rows, const char* field) {
-    std::vector<std::string> seen;
-    for (const Json* row : rows)
-        if (const std::string text = text_at(*row, field);
-            !text.empty() && std::ranges::find(seen, text) == seen.end())
-            seen.push_back(text);
-    std::string all;
-    for (const std::string& text : seen) all += (all.empty() ? "" : ", ") + text;
-    return all;
-}
-
-}  // namespace
-
-std::vector<std::pair<std::string, std::string>> settings_of(const Document& document) {
-    std::vector<std::pair<std::string, std::string>> settings{
-        {"raydix", text_at(document.root, "version")}};
-    for (const char* field : {"cpu", "cores", "isa", "gpu"})
-        settings.emplace_back(field, text_at(document.root, std::string("machine.") + field));
-    for (const char* field : {"tree", "builder", "bits", "max_leaf", "reinsertion_rounds", "layout",
-                              "device", "threads", "tree_hash"})
-        settings.emplace_back(field, text_at(document.root, std::string("build.") + field));
-    settings.emplace_back("leaves", text_at(document.root, "max_leaf"));
-    const std::vector<const Json*> simulated = objects_at(document.root, "simulate");
-    settings.emplace_back("sample asked for, of the rays", values_of(simulated, "sample"));
-    settings.emplace_back("part of the rays that was traced", values_of(simulated, "part_taken"));
-    settings.emplace_back("builder of simulated trees", values_of(simulated, "builder"));
-    return settings;
+std::string what_differs(const Settings& a, const Settings& b) {
+    std::string names;
+    for (const auto& [name, value] : a)
+        for (const auto& [other, other_value] : b)
+            if (name == other && !value.empty() && !other_value.empty() && value != other_value)
+                names += (names.empty() ? "" : ", ") + name;
+    return names;
 }
 
 }  // namespace raydix::report

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "report/compare_rows.h"
+#include "report/compare_settings.h"
 #include "report/html.h"
 #include "report/number_text.h"
 #include "report/sections.h"
@@ -22,7 +23,7 @@ using Better = Measure::Better;
 // A measured change below this says nothing where no spread is known.
 constexpr double least_change = 0.02;
 
-enum class Verdict { better, worse, even, differs, unknown };
+enum class Verdict { better, worse, even, differs, unknown, other_work };
 
 bool overlap(const SpreadFields& a, const SpreadFields& b) {
     return a.min && a.max && b.min && b.max && *a.min <= *b.max && *b.min <= *a.max;
@@ -46,7 +47,8 @@ Verdict verdict_of(const Measure& a, const Measure& b) {
     return (second < first) == (a.better == Better::lower) ? Verdict::better : Verdict::worse;
 }
 
-Cell verdict_cell(Verdict verdict, const Measure& a, const Measure& b) {
+/// `work`: what it was that differs.
+Cell verdict_cell(Verdict verdict, const Measure& a, const Measure& b, const std::string& work) {
     Cell cell;
     switch (verdict) {
         case Verdict::better:
@@ -62,6 +64,10 @@ Cell verdict_cell(Verdict verdict, const Measure& a, const Measure& b) {
             break;
         case Verdict::unknown:
             cell = Cell("open: its error is not known");
+            cell.mark = Cell::Mark::even;
+            break;
+        case Verdict::other_work:
+            cell = Cell("not judged, other work: " + work);
             cell.mark = Cell::Mark::even;
             break;
         case Verdict::even:
@@ -85,7 +91,7 @@ Cell value_cell(const Measure& measure) {
 }
 
 struct Tally {
-    std::size_t better = 0, worse = 0, even = 0, differs = 0, unknown = 0, rows = 0;
+    std::size_t better = 0, worse = 0, even = 0, differs = 0, unknown = 0, other_work = 0, rows = 0;
     double best_gain = 1, worst_loss = 1;  // as factors, both above 1
     std::string best, worst;
 };
@@ -107,7 +113,7 @@ public:
         ++tally_.rows;
         for (const Measure& m : a.measures)
             for (const Measure& n : b.measures)
-                if (m.name == n.name) add_measure(a.key, m, n);
+                if (m.name == n.name) add_measure(a.key, m, n, work_between(a, m, b, n));
     }
 
     [[nodiscard]] std::string html(std::size_t without_partner) const {
@@ -131,6 +137,7 @@ public:
             tally_.rows == 1 ? "row" : "rows", strong(std::to_string(tally_.better)),
             strong(std::to_string(tally_.worse)), tally_.even);
         if (tally_.differs) said += fmt::format(", {} different", tally_.differs);
+        if (tally_.other_work) said += fmt::format(", {} of other work", tally_.other_work);
         if (tally_.unknown) said += fmt::format(", {} of unknown error", tally_.unknown);
         if (tally_.best_gain > 1)
             said += fmt::format("; most gained: {} ({} times)", breakable(tally_.best),
@@ -142,17 +149,27 @@ public:
     }
 
 private:
-    void add_measure(const std::string& key, const Measure& a, const Measure& b) {
+    /// Names of what makes two figures different questions; "" if nothing does.
+    static std::string work_between(const CompareRow& a, const Measure& m, const CompareRow& b,
+                                    const Measure& n) {
+        const std::string of_rows = what_differs(a.work, b.work),
+                          of_figures = what_differs(m.work, n.work);
+        return of_rows + (of_rows.empty() || of_figures.empty() ? "" : ", ") + of_figures;
+    }
+
+    void add_measure(const std::string& key, const Measure& a, const Measure& b,
+                     const std::string& work) {
         const double first = *a.value.median, second = *b.value.median;
         const bool has_ratio = first != 0 && std::isfinite(second / first) &&
                                !(a.origin == Origin::measured && second == 0);
         const auto ratio = has_ratio ? std::optional(second / first) : std::nullopt;
-        const Verdict verdict = verdict_of(a, b);
+        const Verdict verdict = work.empty() ? verdict_of(a, b) : Verdict::other_work;
         table_.rows.push_back({key, a.name,
                                a.origin == Origin::measured    ? "measured"
                                : a.origin == Origin::simulated ? "simulated"
                                                                : "counted",
-                               value_cell(a), value_cell(b), ratio, verdict_cell(verdict, a, b)});
+                               value_cell(a), value_cell(b), ratio,
+                               verdict_cell(verdict, a, b, work)});
         count(verdict, key + ", " + a.name + origin_suffix(a.origin), ratio);
     }
 
@@ -166,19 +183,18 @@ private:
             ++tally_.worse;
             if (change > tally_.worst_loss) tally_.worst = name, tally_.worst_loss = change;
         } else {
-            ++(verdict == Verdict::even      ? tally_.even
-               : verdict == Verdict::unknown ? tally_.unknown
-                                             : tally_.differs);
+            ++(verdict == Verdict::even         ? tally_.even
+               : verdict == Verdict::unknown    ? tally_.unknown
+               : verdict == Verdict::other_work ? tally_.other_work
+                                                : tally_.differs);
         }
     }
 
     [[nodiscard]] std::string settings_table() const {
         Table table{.title = "Settings that differ",
                     .columns = {{"setting"}, {"first"}, {"second"}}};
-        const auto a = settings_of(first_), b = settings_of(second_);
-        for (std::size_t i = 0; i < a.size() && i < b.size(); ++i)
-            if (a[i].second != b[i].second)
-                table.rows.push_back({a[i].first, a[i].second, b[i].second});
+        for (const DifferentSetting& setting : different_settings(first_, second_))
+            table.rows.push_back({setting.name, setting.first, setting.second});
         if (table.rows.empty())
             return "<p class=\"note\">Machine, version and settings are the same.</p>\n";
         return table_html(table);

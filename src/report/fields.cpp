@@ -73,6 +73,12 @@ std::string text_at(const Json& value, std::string_view path) {
     return field.is_number() ? significant(field.get<double>(), 4) : "";
 }
 
+std::string setting_at(const Json& value, std::string_view path) {
+    const Json& field = at(value, path);
+    if (field.is_number_float()) return fmt::format("{}", field.get<double>());
+    return field.is_number() ? field.dump() : text_at(value, path);
+}
+
 std::vector<double> numbers_at(const Json& value, std::string_view path) {
     std::vector<double> numbers;
     const Json& list = at(value, path);

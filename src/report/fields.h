@@ -29,6 +29,8 @@ struct Document {
 [[nodiscard]] std::optional<double> number_at(const Json& value, std::string_view path);
 /// Texts as they are, numbers and truth values as text; empty if absent.
 [[nodiscard]] std::string text_at(const Json& value, std::string_view path);
+/// The same with all digits of a number: texts that differ where the values do.
+[[nodiscard]] std::string setting_at(const Json& value, std::string_view path);
 /// All numbers of a list; what is none of them becomes NaN.
 [[nodiscard]] std::vector<double> numbers_at(const Json& value, std::string_view path);
 

@@ -42,7 +42,7 @@ const std::map<std::string, std::set<std::string>>& known_fields() {
     return known;
 }
 
-const std::set<std::string> common_fields{"command", "version", "machine", "load_ms"};
+const std::set<std::string> common_fields{"command", "version", "machine", "load_ms", "seed"};
 
 }  // namespace
 

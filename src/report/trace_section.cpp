@@ -41,6 +41,10 @@ std::string name_rows(std::vector<TraceRow>& rows) {
         parts.push_back(
             {row.rays, mode.empty() ? "" : mode + " hit", kernel.empty() ? "" : "kernel " + kernel,
              builder.empty() ? "" : "tree of " + builder, text_at(*row.trace, "device")});
+        const std::string path = text_at(*row.trace, "path");
+        parts.back().push_back(text_at(row.document->root, "build.layout"));
+        parts.back().push_back(path.empty() ? "" : path + " path");
+        parts.back().push_back(text_at(*row.trace, "isa"));
         for (const std::string& setting : tree_settings(at(row.document->root, "build")))
             parts.back().push_back(setting);
         sources.push_back(row.document->name);
@@ -86,6 +90,12 @@ std::string table_of(const std::vector<TraceRow>& rows) {
                             {"kernel"},
                             {"device"},
                             {"tree of"},
+                            {"layout"},
+                            {"path"},
+                            {"code"},
+                            {"camera"},
+                            {"size"},
+                            {"samples", Format::integer},
                             {"rays traced", Format::integer},
                             {"hits", Format::percent, "of the rays"},
                             {"rate", Format::number, "Mrays/s, median"},
@@ -101,11 +111,26 @@ std::string table_of(const std::vector<TraceRow>& rows) {
         std::optional<double> share;
         // All-hits counts may exceed the rays: then there is no share.
         if (count && hits && *count > 0 && *hits <= *count) share = *hits / *count;
-        table.rows.push_back({row.scene, row.rays, text_at(t, "mode"), text_at(t, "kernel"),
-                              text_at(t, "device"), text_at(row.document->root, "build.builder"),
-                              count, share, row.rate.median, row.rate.min, row.rate.max,
+        table.rows.push_back({row.scene,
+                              row.rays,
+                              text_at(t, "mode"),
+                              text_at(t, "kernel"),
+                              text_at(t, "device"),
+                              text_at(row.document->root, "build.builder"),
+                              text_at(row.document->root, "build.layout"),
+                              text_at(t, "path"),
+                              text_at(t, "isa"),
+                              text_at(t, "camera"),
+                              text_at(t, "size"),
+                              number_at(t, "samples"),
+                              count,
+                              share,
+                              row.rate.median,
+                              row.rate.min,
+                              row.rate.max,
                               number_at(t, "node_visits_per_ray"),
-                              number_at(t, "triangle_tests_per_ray"), number_at(t, "invalid_rays"),
+                              number_at(t, "triangle_tests_per_ray"),
+                              number_at(t, "invalid_rays"),
                               row.document->name});
     }
     table.drop_empty_columns();

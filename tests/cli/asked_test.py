@@ -1,5 +1,6 @@
-"""What documents say of the options that their run was given."""
+"""What documents say of the options that their run was given, and how a report compares two runs."""
 import json
+import re
 import sys
 
 sys.dont_write_bytecode = True
@@ -7,6 +8,15 @@ from program import ProgramTest, main, ply  # noqa: E402
 
 SOUP = "builtin:soup?triangles=3000"
 SMALL = ("--size", "16x12", "--camera", "0", "--repeat", "2")
+
+
+def changed(command, option, value):
+    """The command with another value of an option, which it may have."""
+    words = list(command)
+    if option not in words:
+        return (*words, option, value)
+    words[words.index(option) + 1] = value
+    return tuple(words)
 
 
 class Asked(ProgramTest):
@@ -69,6 +79,38 @@ class Asked(ProgramTest):
         self.assertEqual([slice_of[f] for f in fields], [None, "bvh", None, "karras", "2-3", "x", 0.25])
         octree = self.document("render", SOUP, *size, "--view", "tree", "--tree", "octree")["render"]
         self.assertEqual([octree[f] for f in fields], [None, "octree", None, None, None, None, None])
+
+    def compared(self, first, second):
+        for name, arguments in (("a.json", first), ("b.json", second)):
+            self.succeed(*arguments, "--quiet", "--json", name)
+        self.succeed("report", "a.json", "b.json", "-o", "page.html")
+        html = re.sub("<wbr>", "", (self.folder / "page.html").read_text(encoding="utf-8"))
+        return re.search(r'<section id="comparison">.*?</section>', html, re.DOTALL).group(0)
+
+    def test_a_report_tells_which_options_differ(self):
+        build, ao = ("build", SOUP), ("trace", SOUP, *SMALL, "--rays", "ao", "--samples", "2")
+        for command, options, name in (
+                (build, ["--sah-node", "5"], "sah_node"), (build, ["--sah-primitive", "5"], "sah_primitive"),
+                (build, ["--repeat", "4"], "repeat"), (build, ["--threads", "1"], "threads"), (build, ["--seed", "2"], "seed"),
+                ((*build, "--builder", "karras"), ["--fit", "levels"], "fit"), (build, ["--layout", "wide8"], "layout"),
+                ((*build, "--epo", "1"), ["--epo", "0.5"], "epo_sample"),
+                (ao, ["--isa", "sse4"], "instruction set of the engine"), (ao, ["--path", "single"], "path"),
+                (ao, ["--ao-radius", "0.5"], "ao_radius"), (ao, ["--seed", "2"], "seed")):
+            if "sse4" in options and "sse4" not in self.document("trace", SOUP, *SMALL)["trace"][0]["isa"]:
+                options = ["--isa", "sse4"] if self.run_program(*ao, "--isa", "sse4").code == 0 else ["--path", "single"]
+                name = name if options[0] == "--isa" else "path"
+            part = self.compared(command, changed(command, *options))
+            if name == "threads" and "settings are the same" in part:
+                continue  # a machine of one core
+            self.assertNotIn("settings are the same", part, options)
+            self.assertIn(f">{name}</th>", part, options)
+        for command, options in ((ao, ["--ao-radius", "0.5"]), (ao, ["--samples", "3"]), (ao, ["--size", "8x8"]), (ao, ["--seed", "2"])):
+            part = self.compared(command, changed(command, *options))
+            self.assertIn("not judged, other work", part)
+            self.assertNotRegex(part, "\u25b2 better|\u25bc worse")
+        costs = self.compared(build, (*build, "--sah-node", "5"))
+        sah = re.search(r"<td[^>]*>SAH</td>.*?</tr>", costs, re.DOTALL).group(0)
+        self.assertIn("not judged, other work: sah_node", sah)
 
 
 if __name__ == "__main__":
