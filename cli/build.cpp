@@ -242,6 +242,7 @@ void add_check_command(CLI::App& app) {
             ->type_name("A B");
     scene->excludes(same);
     add_tree_options(*command, options->tree);
+    offer_builds(*command);
     add_flatten_option(*command, options->common);
     add_common_options(*command, options->common);
     command->callback([options, scene, same] {

@@ -202,7 +202,8 @@ void add_mpi_render(CLI::App& app) {
     command->add_flag("--distributed", options->is_distributed,
                       "Spread the scene over the ranks. Without it each rank reads and holds all");
     command->callback([options, command] {
-        on_first([&] { require_picture(options->picture.out_file); });
+        options->picture.refuse_views();
+        on_first([&] { require_writable(options->picture.out_file); });
         require_writable_results(*command, options->common, "", "");
         run_render(*options);
     });

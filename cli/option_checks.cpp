@@ -168,11 +168,4 @@ void require_writable(const std::string& file) {
         throw InputError(file + ": cannot write: " + std::generic_category().message(error));
 }
 
-void require_picture(const std::string& file) {
-    const std::string ending = CLI::detail::to_lower(std::filesystem::path(file).extension());
-    if (!file.empty() && ending != ".png" && ending != ".exr")
-        throw InputError(file + ": unknown picture type '" + ending + "'; known: .png .exr");
-    require_writable(file);
-}
-
 }  // namespace raydix::cli

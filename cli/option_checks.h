@@ -37,7 +37,5 @@ void refuse_shared_files(const CLI::App& program);
 /// Before the work of which `file` takes the result, as far as can be told then. Empty: nothing to
 /// check. Throws InputError as writing would.
 void require_writable(const std::string& file);
-/// The same of a picture: also its ending.
-void require_picture(const std::string& file);
 
 }  // namespace raydix::cli

@@ -151,6 +151,11 @@ void offer_binary_layout(CLI::App& command) {
     offer(command, "--device", "Where to build and trace", "{cpu}");
 }
 
+void offer_builds(CLI::App& command) {
+    offer(command, "--layout", "Memory layout (default: binary)", "{binary}");
+    offer(command, "--device", "Where to build", "cpu|cuda|opencl[:N]|hip[:N]");
+}
+
 void offer_binary_tree(CLI::App& command, TreeOptions& options, const std::string& devices) {
     offer_binary_layout(command);
     offer(command, "--tree", "Kind of tree", "{bvh}");
@@ -366,6 +371,19 @@ std::string reason_about(const std::string& scene, const std::string& reason,
     if (reason.starts_with(scene + ": ")) return reason;
     if (!name.empty() && reason.starts_with(name + ": ")) return scene + reason.substr(name.size());
     return scene + ": " + reason;
+}
+
+CLI::Validator any_finite_number() {
+    return {[](std::string& text) {
+                double value = 0;
+                const char* end = text.data() + text.size();
+                const char* begin = text.data() + (text.starts_with('+') ? 1 : 0);
+                const auto [rest, error] = std::from_chars(begin, end, value);
+                const bool good = error == std::errc() && rest == end && std::isfinite(value) &&
+                                  std::isfinite(static_cast<float>(value));
+                return good ? std::string() : "'" + text + "' is not a finite float32 number";
+            },
+            ""};
 }
 
 CLI::Validator finite_number(bool zero_too) {

@@ -55,6 +55,8 @@ void add_tree_options(CLI::App& command, TreeOptions& options);
 /// For commands that take the binary layout on the cpu alone, after add_tree_options: their help
 /// offers no other.
 void offer_binary_layout(CLI::App& command);
+/// For commands that build the binary layout, there too, and trace nothing.
+void offer_builds(CLI::App& command);
 /// For commands that walk the binary tree alone, after add_tree_options: their help offers no value
 /// of --tree and --layout that they refuse, and as --device what `devices` says. "": the cpu.
 void offer_binary_tree(CLI::App& command, TreeOptions& options, const std::string& devices = "");
@@ -107,6 +109,9 @@ void refuse_device(const TreeOptions& tree);
 
 /// For add_option(...)->check: a finite number above 0, or from 0 on, that is one as a float, too.
 [[nodiscard]] CLI::Validator finite_number(bool zero_too);
+
+/// The same, of any sign, without words in the help.
+[[nodiscard]] CLI::Validator any_finite_number();
 
 /// --max-result-bytes.
 void add_result_limit(CLI::App& command, std::uint64_t& max_result_bytes);

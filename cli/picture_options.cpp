@@ -1,6 +1,10 @@
 #include "picture_options.h"
 
 #include <raydix/error.h>
+#include <raydix/rays.h>
+
+#include <algorithm>
+#include <filesystem>
 
 #include "option_checks.h"
 #include "ray_launches.h"
@@ -10,7 +14,30 @@ namespace {
 
 Vec3 vec_of(const std::vector<float>& v) { return {v[0], v[1], v[2]}; }
 
+std::string picture_fault(const std::string& file) {
+    const std::string ending = CLI::detail::to_lower(std::filesystem::path(file).extension());
+    if (file.empty()) return "the name of the file is empty";
+    return ending == ".png" || ending == ".exr"
+               ? ""
+               : file + ": unknown picture type '" + ending + "'; known: .png .exr";
+}
+
 }  // namespace
+
+void PictureOptions::refuse_views() const {
+    const bool points_nowhere = std::ranges::all_of(up, [](float x) { return x == 0; });
+    if (!up.empty() && points_nowhere) throw CLI::ValidationError("--up", "0 0 0 is no direction");
+    if (eye.empty() || target.empty()) return;
+    if (eye == target)
+        throw CLI::ValidationError("--eye", "is where --target is: there is no view");
+    if (up.empty()) return;
+    const Camera shown{"", vec_of(eye), vec_of(target), vec_of(up), 45.0f};
+    try {
+        static_cast<void>(make_primary_rays(shown, 1, 1));
+    } catch (const InputError&) {
+        throw CLI::ValidationError("--up", "is parallel to the view from --eye to --target");
+    }
+}
 
 Camera PictureOptions::chosen_camera(const Model& scene) const {
     if (eye.empty() || camera != 0) require_cameras(scene);
@@ -71,7 +98,7 @@ void add_picture_options(CLI::App& command, PictureOptions& options,
     command
         .add_option("-o,--output", options.out_file,
                     "Picture to write: .png, or .exr for linear values")
-        ->check(file_name())
+        ->check(CLI::Validator(picture_fault, ""))
         ->required()
         ->type_name("PICTURE");
     command.add_option("--view", options.view, "What to show")
@@ -82,7 +109,11 @@ void add_picture_options(CLI::App& command, PictureOptions& options,
         ->transform(whole_number(0))
         ->capture_default_str();
     const auto add_vector = [&](const char* name, std::vector<float>& value, const char* what) {
-        command.add_option(name, value, what)->expected(3)->delimiter(',')->allow_extra_args(false);
+        command.add_option(name, value, what)
+            ->expected(3)
+            ->delimiter(',')
+            ->allow_extra_args(false)
+            ->check(any_finite_number());
     };
     add_vector("--eye", options.eye, "Camera position x y z");
     add_vector("--target", options.target, "Point looked at x y z");

@@ -19,6 +19,8 @@ struct PictureOptions {
     int samples = 0;
     float ao_radius = 0.0f;
 
+    /// Usage errors: --eye, --target and --up that make no view, whatever the scene is.
+    void refuse_views() const;
     /// Of the scene's cameras the one that was asked for, moved as it was asked for. Throws
     /// InputError: there is no such camera, or cameras.json is at fault and --eye does not replace
     /// it.

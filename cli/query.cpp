@@ -28,6 +28,7 @@ void run_query(const QueryCommand& options) {
     if (of_points != 0) {
         refuse(!options.builder.empty(), "--builder",
                "belongs to --closest, --signed-distance and --pairs");
+        refuse(options.sort && options.k, "--sort", "belongs to --radius and --box");
         return run_point_query(options);
     }
     refuse(options.sort, "--sort", "belongs to --radius and --box");
@@ -162,7 +163,7 @@ void add_query_command(CLI::App& app) {
                      "PREFIX.pairs-instances.npy")
         ->type_name("PREFIX");
     command->add_flag("--sort", options->sort,
-                      "Rows of --radius by distance instead of by index (of --knn they always are)");
+                      "Rows of --radius and --box by distance instead of by index");
     command->add_option("--tree", options->tree, "How points are grouped; answers are the same")
         ->check(CLI::IsMember({"automatic", "kdtree", "bvh"}))
         ->capture_default_str();

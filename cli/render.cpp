@@ -152,7 +152,8 @@ void add_render_command(CLI::App& app) {
     add_flatten_option(*command, options->common);
     add_common_options(*command, options->common);
     command->callback([options] {
-        require_picture(options->out_file);
+        options->refuse_views();
+        require_writable(options->out_file);
         require_writable_json(options->common);
         run_render(*options);
     });

@@ -456,8 +456,12 @@ void print_steps_to_scheduled(const std::vector<SimulationRow>& rows) {
 }
 
 MachineModel machine_from(const std::string& name_or_file) {
-    return name_or_file.ends_with(".json") ? load_machine_model(name_or_file)
-                                           : machine_model(name_or_file);
+    if (name_or_file.ends_with(".json")) return load_machine_model(name_or_file);
+    try {
+        return machine_model(name_or_file);
+    } catch (const InputError& error) {
+        throw CLI::ValidationError("--machine", error.what() + std::string(", and .json files"));
+    }
 }
 
 void check_machine(const std::string& name_or_file, std::span<const SimulateOptions> runs) {

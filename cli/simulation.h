@@ -98,7 +98,7 @@ struct SimulationEnd {
 void print_simulation(const std::vector<SimulationRow>& rows);
 /// Which part of the way from bound to scheduled is due to what, of rows over whole launches.
 void print_steps_to_scheduled(const std::vector<SimulationRow>& rows);
-/// A machine by name, or from a JSON file.
+/// A machine by name, or from a JSON file. Another name is a usage error.
 [[nodiscard]] MachineModel machine_from(const std::string& name_or_file);
 /// Before any work. Throws InputError if a run has a machine that cannot be; it names the file if
 /// there is one.

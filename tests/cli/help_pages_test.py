@@ -117,6 +117,18 @@ class HelpPages(ProgramTest):
         for refused in ("wide8", "cwbvh", "cuda", "|sim"):
             self.assertNotIn(refused, text)
 
+    def test_help_of_check_offers_what_it_takes(self):
+        text, page = self.succeed("check", "--help").out, self.succeed("man", "check").out
+        for refused in ("wide8", "wide4", "cwbvh", "compact", "|sim"):
+            self.assertNotIn(refused, text)
+            self.assertNotIn(refused, page)
+        for offered in ("octree", "kdtree", "opencl"):
+            self.assertIn(offered, text)
+        self.assertEqual(self.complete("raydix", "check", "x.ply", "--layout", ""), {"binary"})
+        self.assertNotIn("sim", self.complete("raydix", "check", "x.ply", "--device", ""))
+        for layout in ("wide8", "wide4", "compact", "cwbvh"):
+            self.fail_with_usage("check", "builtin:soup?triangles=5", "--layout", layout, names=["--layout"])
+
     def test_all_pages_into_a_folder(self):
         (self.folder / "pages").mkdir()
         self.succeed("man", "--folder", "pages")

@@ -103,6 +103,10 @@ class Query(ProgramTest):
         self.assertEqual(document["query"][0]["max_distance"], 0.25)
         self.fail_with_usage("query", self.cloud, "--radius", "1", "--max-distance", "1", names=["--max-distance"])
 
+    def test_sort_belongs_to_lists(self):
+        for kind in (["--knn", "2"], ["--closest"], ["--pairs"]):
+            self.fail_with_usage("query", self.cloud, *kind, "--sort", names=["--sort", "--radius and --box"])
+
     def test_radius(self):
         for radius in (0, 0.25, 1e30):
             for sort in (False, True):

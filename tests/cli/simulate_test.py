@@ -216,7 +216,8 @@ class Simulate(ProgramTest):
         file = self.write("caches.json", '{"base": "gtx480", "l1_bytes": 4000000000}')
         self.fail_with_one_line("simulate", SCENE, "--memory", "--machine", file, names=["caches.json", "l1_bytes", "2^30"])
         self.fail_with_one_line("simulate", SCENE, "--machine", "none.json", names=["none.json"])
-        self.fail_with_one_line("simulate", SCENE, "--machine", "gtx1", names=["gtx1", "gtx285_enum_popc"])
+        for command in (("simulate",), ("bench", "traversal")):
+            self.fail_with_usage(*command, SCENE, "--machine", "gtx1", names=["--machine", "gtx1", "gtx285_enum_popc", ".json"])
 
     def test_usage(self):
         self.fail_with_usage("simulate")

@@ -96,6 +96,18 @@ class Usage(ProgramTest):
         self.assertIsNotNone(self.document("build", "--epo", "0.5", SMALL)["build"]["epo"])
         self.fail_with_usage("render", SMALL, "-o", "x.png", "--eye", "1", "2", names=["--eye", "3 required"])
 
+    def test_views_that_are_none(self):
+        absent = ("render", "absent.ply", "-o", "x.png")  # the command line alone is at fault
+        for option in ("--eye", "--target", "--up"):
+            for bad in ("nan", "inf", "1e39", "x"):
+                self.fail_with_usage(*absent, option, "1", "2", bad, names=[option])
+            self.fail_with_usage(*absent, option, "1,2,nan", names=[option, "'nan' is not a finite"])
+        self.fail_with_usage(*absent, "--up", "0,0,-0", names=["--up", "no direction"])
+        self.fail_with_usage(*absent, "--eye", "1,2,3", "--target", "1,2,3.0", names=["--eye", "--target"])
+        self.fail_with_usage(*absent, "--eye", "1,2,3", "--target", "1,2,4", "--up", "0,0,-2", names=["--up", "parallel to the view"])
+        self.fail_with_one_line(*absent, "--eye", "1,2,3", "--target", "1,2,4", "--up", "0,1,0", names=["absent.ply"])
+        self.succeed("render", SMALL, "-o", "x.png", "--size", "8x8", "--eye", "+1", "2e0", "-3", "--up", "0,1,0")
+
     def test_names_of_files_that_are_empty(self):
         """As a shell gives a variable that has no value."""
         for arguments, option in ((("info", "tri.ply"), "--json"), (("trace", "tri.ply"), "--cameras"), (("query", "tri.ply", "--pairs"), "--with"),
@@ -151,8 +163,9 @@ class Usage(ProgramTest):
 
     def test_outputs_are_tried_before_the_work(self):
         absent = "absent.ply"  # the work would fail with it
-        for command, names in ((("render", absent, "-o", "x.jpg"), ("x.jpg", "known: .png .exr")),
-                               (("render", absent, "-o", "no/x.png"), ("no/x.png: cannot write",)),
+        self.fail_with_usage("render", absent, "-o", "x.jpg", names=["--output", "x.jpg", "known: .png .exr"])
+        self.fail_with_usage("render", absent, "-o", "picture", names=["--output", "picture", "known: .png .exr"])
+        for command, names in ((("render", absent, "-o", "no/x.png"), ("no/x.png: cannot write",)),
                                (("render", absent, "-o", "x.png", "--json", "no/x.json"), ("no/x.json: cannot write",)),
                                (("trace", absent, "--hits", "no/h.npy"), ("no/h.npy: cannot write",)),
                                (("trace", absent, "--save-rays", "/"), ("/: cannot write",)),
@@ -238,7 +251,7 @@ class Usage(ProgramTest):
         self.fail_with_one_line("build", file, "--cameras", "bad_cameras.json", names=["bad_cameras.json"])
         self.fail_with_one_line("trace", file, "--camera", "7", names=["triangle.ply", "camera 7"])
         self.fail_with_one_line("render", file, "--camera", "7", "-o", "x.png", names=["triangle.ply", "camera 7"])
-        self.fail_with_one_line("render", file, "-o", "x.bmp", "--size", "4x4", names=["x.bmp"])
+        self.fail_with_usage("render", file, "-o", "x.bmp", "--size", "4x4", names=["--output", "x.bmp"])
         self.fail_with_one_line("trace", file, "--rays", "absent.npy", names=["absent.npy"])
         self.fail_with_one_line("trace", file, "--rays", self.write("bad.npy", b"\x93NUMPY"), names=["bad.npy"])
 

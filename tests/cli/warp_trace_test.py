@@ -21,7 +21,8 @@ class WarpTrace(ProgramTest):
         for command in ("build", "check", "render"):
             more = ["-o", "x.png"] if command == "render" else []
             self.fail_with_usage(command, SOUP, "--device", "sim", *more, names=["--device", "sim"])
-        self.fail_with_one_line("trace", SOUP, "--device", "sim", "--machine", "abacus", names=["abacus", "h200"])
+        self.fail_with_usage("trace", SOUP, "--device", "sim", "--machine", "abacus", names=["--machine", "abacus", "h200"])
+        self.fail_with_one_line("trace", SOUP, "--device", "sim", "--machine", "absent.json", names=["absent.json"])
 
     def test_every_kernel_in_the_simulator(self):
         for rays in ("primary", "ao"):
