@@ -282,6 +282,7 @@ Json asked_json(const TraceCommand& options, Size size) {
     const std::string& cameras = options.tree.cameras_file;
     asked["cameras"] = from_file || cameras.empty() ? Json(nullptr) : Json(cameras);
     asked["repeat"] = options.repeat;
+    asked["isa"] = asked["ao_radius"] = nullptr;
     asked["path"] = options.kernel == "engine" ? Json(options.wide.path) : Json(nullptr);
     return asked;
 }

@@ -34,8 +34,8 @@ class Asked(ProgramTest):
         self.assertEqual([ao[f] for f in ("camera", "cameras", "size", "samples", "ao_radius", "path")],
                          ["0", "cameras.json", "16x12", 3, 0.5, "single"])
         given = self.document("trace", SOUP, "--rays", "rays.npy", "--kernel", "scalar")["trace"][0]
-        self.assertEqual([given[f] for f in ("rays", "camera", "cameras", "size", "samples", "path")],
-                         ["rays.npy", None, None, None, None, None])
+        self.assertEqual([given[f] for f in ("rays", "camera", "cameras", "size", "samples", "ao_radius", "path", "isa")],
+                         ["rays.npy", *[None] * 7])
         shuffled = self.document("trace", SOUP, *SMALL, "--rays", "diffuse_shuffled", "--samples", "2")["trace"][0]
         self.assertEqual((shuffled["rays"], shuffled["samples"]), ("diffuse_shuffled", 2))
 
