@@ -371,7 +371,7 @@ FAULTS = [
     Fault("src/exec/path_rates.h", "void share(const PathRates& other) { known_ = other.known_; }",
           "void share(const PathRates&) {}", "rates: a new frame knows nothing of the last one", "trace"),
     Fault("src/exec/path_rates.h", "(known(tried[0]) && cost(tried[0]) < half_below * cost(best))",
-          "false;", "rates: ways that need many rays are judged by few", "trace"),
+          "false", "rates: ways that need many rays are judged by few", "trace"),
     Fault("src/exec/path_rates.h", "std::min(least_pause << trials, longest_pause);",
           "longest_pause;", "rates: one of the first trials rests a way for long", "trace"),
     Fault("src/exec/path_rates.h", "often ? 1u << std::min(trials - often_tried, 4) : 1;",
