@@ -220,6 +220,7 @@ void add_build_command(CLI::App& app) {
         ->check(file_name())
         ->type_name("FILE.rdx");
     add_tree_options(*command, options->tree);
+    offer_builders(*command);
     add_tree_figure_options(*command, options->tree);
     add_flatten_option(*command, options->common);
     add_common_options(*command, options->common);

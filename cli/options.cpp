@@ -151,9 +151,13 @@ void offer_binary_layout(CLI::App& command) {
     offer(command, "--device", "Where to build and trace", "{cpu}");
 }
 
+void offer_builders(CLI::App& command) {
+    offer(command, "--device", "Where to build", "cpu|cuda|opencl[:N]|hip[:N]");
+}
+
 void offer_builds(CLI::App& command) {
     offer(command, "--layout", "Memory layout (default: binary)", "{binary}");
-    offer(command, "--device", "Where to build", "cpu|cuda|opencl[:N]|hip[:N]");
+    offer_builders(command);
 }
 
 void offer_binary_tree(CLI::App& command, TreeOptions& options, const std::string& devices) {

@@ -57,6 +57,8 @@ void add_tree_options(CLI::App& command, TreeOptions& options);
 void offer_binary_layout(CLI::App& command);
 /// For commands that build the binary layout, there too, and trace nothing.
 void offer_builds(CLI::App& command);
+/// For commands that build, and trace nothing.
+void offer_builders(CLI::App& command);
 /// For commands that walk the binary tree alone, after add_tree_options: their help offers no value
 /// of --tree and --layout that they refuse, and as --device what `devices` says. "": the cpu.
 void offer_binary_tree(CLI::App& command, TreeOptions& options, const std::string& devices = "");

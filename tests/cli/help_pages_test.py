@@ -126,6 +126,8 @@ class HelpPages(ProgramTest):
             self.assertIn(offered, text)
         self.assertEqual(self.complete("raydix", "check", "x.ply", "--layout", ""), {"binary"})
         self.assertNotIn("sim", self.complete("raydix", "check", "x.ply", "--device", ""))
+        self.assertNotIn("|sim", self.succeed("build", "--help").out)
+        self.assertNotIn("sim", self.complete("raydix", "build", "x.ply", "--device", ""))
         for layout in ("wide8", "wide4", "compact", "cwbvh"):
             self.fail_with_usage("check", "builtin:soup?triangles=5", "--layout", layout, names=["--layout"])
 

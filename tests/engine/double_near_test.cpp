@@ -437,7 +437,7 @@ TEST(DoubleNear, ShapesAnswerWhatTheyAre) {
 /// The square of a distance has no end, but the point is that of a place on the same line that is
 /// near enough for squares.
 TEST(DoubleNear, ShapesAreFoundFromTheEndOfAllDoubles) {
-    const std::vector<SphereD> spheres{{{1, -2, 3}, 2}};
+    const std::vector<SphereD> spheres{{{1, -2, 3}, 1e-3}};  // in its units queries end sooner
     const std::vector<CapsuleD> capsules{{{4, 0, 1}, {7, 1, -1}, 0.5}};
     TransformD wide;
     wide.m[0][0] = 3, wide.m[1][0] = 0.5;
