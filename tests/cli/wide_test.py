@@ -2,7 +2,7 @@
 import sys
 
 sys.dont_write_bytecode = True
-from program import ProgramTest, main  # noqa: E402
+from program import SANITIZED, ProgramTest, main  # noqa: E402
 
 SCENE = "builtin:figure?triangles=20000"
 LAYOUTS = ("wide8", "wide4", "compact")
@@ -37,7 +37,7 @@ class Wide(ProgramTest):
         self.assertEqual(set(binary["ms"]), set(ms))
 
     def test_times_have_the_layout_in_them(self):
-        for builder in ("ploc", "apetrei", "sweep", "karras"):
+        for builder in ("ploc", "karras") if SANITIZED else ("ploc", "apetrei", "sweep", "karras"):
             for layout in LAYOUTS:
                 build = self.document("build", SCENE, "--builder", builder, "--repeat", "1", "--layout", layout)["build"]
                 self.assert_layout_is_in(build)
