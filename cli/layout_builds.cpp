@@ -108,17 +108,9 @@ TimedBuilds add_cwbvh(Json& build, const LayoutRequest& request) {
     build["layout"] = "cwbvh";
     build["layout_nodes"] = s.nodes;
     build["bytes"] = s.bytes;
-    build["cwbvh"] = {{"nodes", s.nodes},
-                      {"leaves", s.leaf_children},
-                      {"references", s.references},
-                      {"max_depth", s.max_depth},
-                      {"children_per_node", s.children_per_node},
-                      {"sah", s.sah},
-                      {"widening", s.widening},
-                      {"node_bytes", s.node_bytes},
-                      {"triangle_bytes", s.triangle_bytes},
-                      {"bytes_per_triangle", s.bytes_per_triangle},
-                      {"ms", spread_of(ms).median}};
+    Json& figures = build["cwbvh"] = wide_figures_json(s, s.leaf_children);
+    figures["bytes_per_triangle"] = s.bytes_per_triangle;
+    figures["ms"] = spread_of(ms).median;
     TimedBuilds builds = after_trees(request.of_tree, ms);
     if (!request.on_device) builds.peak_bytes = peak_with_layout(request.bvh, s.peak_bytes);
     return builds;

@@ -128,20 +128,12 @@ void add_wide(Json& build, const WideBvh& tree) {
     build["layout"] = layout_name(s);
     build["layout_nodes"] = s.nodes;
     build["bytes"] = s.bytes;
-    build["wide"] = {{"layout", layout_name(s)},
-                     {"nodes", s.nodes},
-                     {"leaves", s.leaves},
-                     {"references", s.references},
-                     {"max_depth", s.max_depth},
-                     {"children_per_node", s.children_per_node},
-                     {"sah", s.sah},
-                     {"widening", s.widening},
-                     {"node_bytes", s.node_bytes},
-                     {"triangle_bytes", s.triangle_bytes},
-                     {"ms", s.ms},
-                     {"layout_ms", s.layout_ms},
-                     {"build_ms", nullptr},
-                     {"kept_ms", nullptr}};
+    Json& wide = build["wide"] = {{"layout", layout_name(s)}};
+    wide.update(wide_figures_json(s, s.leaves));
+    wide["ms"] = s.ms;
+    wide["layout_ms"] = s.layout_ms;
+    wide["build_ms"] = nullptr;
+    wide["kept_ms"] = nullptr;
 }
 
 void add_traced_wide(Json& build, const Bvh& bvh, const WideBvh& tree,

@@ -56,6 +56,20 @@ private:
     std::map<std::string, std::uint64_t> batches_;
 };
 
+/// What WideBvhStats and CwbvhStats have in common.
+template <class Stats>
+[[nodiscard]] Json wide_figures_json(const Stats& s, std::uint64_t leaves) {
+    return {{"nodes", s.nodes},
+            {"leaves", leaves},
+            {"references", s.references},
+            {"max_depth", s.max_depth},
+            {"children_per_node", s.children_per_node},
+            {"sah", s.sah},
+            {"widening", s.widening},
+            {"node_bytes", s.node_bytes},
+            {"triangle_bytes", s.triangle_bytes}};
+}
+
 /// The wide tree; what a trace touches is then its.
 void add_wide(Json& build, const WideBvh& tree);
 /// The same in a document of `trace`, whose times and peak then have the layout in them. No builds:
