@@ -231,9 +231,17 @@ std::vector<Question> ask_moving(const Question& about,
     for (const auto& peer : peers) sides.push_back(peer.get());
     sides.push_back(&ours);
     std::vector<Question> questions;
-    for (const bool with_transforms : {false, true}) {
+    struct Way {
+        const char* text;
+        bool with_transforms;
+        std::size_t count;
+    };
+    const std::size_t all = places[0].size(), few = (all + 99) / 100;
+    for (const auto& [text, with_transforms, count] :
+         {Way{"commit", false, all}, Way{"transforms and commit", true, all},
+          Way{"transforms of 1 %, commit", true, few}}) {
         Question question = about;
-        question.text = with_transforms ? "transforms and commit" : "commit";
+        question.text = text;
         question.in_ms = question.compares_times = true;
         std::vector<Turn> turns;
         std::vector<std::size_t> moves(sides.size(), 0);
@@ -241,7 +249,9 @@ std::vector<Question> ask_moving(const Question& about,
             MovingSide* side = sides[k];
             question.modes.push_back(timed_mode(
                 {.side = side->name(), .name = "commit", .ours = side == &ours}, options));
-            const auto move = [&places, &moves, side, k] { side->move(places[++moves[k] % 2]); };
+            const auto move = [&places, &moves, side, k, moved = count] {
+                side->move(std::span(places[++moves[k] % 2]).first(moved));
+            };
             if (with_transforms)
                 turns.push_back({{}, [move, side] {
                                      move();

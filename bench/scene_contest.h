@@ -54,8 +54,8 @@ using RaySides = std::vector<std::unique_ptr<RaySide>>;
                                    const Mesh& mesh, ClosestSide& ours,
                                    const std::vector<std::unique_ptr<ClosestSide>>& peers,
                                    const SceneBench& options);
-/// Commits alone, then transforms and commits. Each round moves all instances. Rays are compared
-/// after the last one.
+/// Commits alone, then transforms and commits, where each round moves all instances; then where it
+/// moves the first hundredth. Rays are compared after each.
 [[nodiscard]] std::vector<Question> ask_moving(
     const Question& about, const std::array<std::vector<Affine>, 2>& places, const RayKindOf& rays,
     MovingSide& ours, const std::vector<std::unique_ptr<MovingSide>>& peers,

@@ -175,10 +175,33 @@ private:
         }
     }
 
+    struct Member {
+        std::size_t what;  // of scenes_
+        typename Kit::Map map;
+        std::uint32_t mask;
+    };
+    Member any_member(std::size_t what) {
+        Random& random = case_.random;
+        const auto map = any_transform<typename Kit::Map>(random);
+        return {what, map, random.chance(0.5) ? 0xFFFFFFFFu : random.below(8)};
+    }
+
+    /// Commits after few changes; those of the last one are still to be committed.
+    void move_some(typename Kit::Scene& scene, const SceneOptions& options,
+                   std::vector<Member>& members) {
+        for (std::uint32_t round = 0; round < 6; ++round) {
+            scene.commit(options);
+            const std::uint32_t k = case_.random.below(static_cast<std::uint32_t>(members.size()));
+            members[k] = any_member(members[k].what);
+            scene.set_transform(k, members[k].map);
+            scene.set_mask(k, members[k].mask);
+        }
+    }
+
     /// The meshes, then scenes that show what was made before; the last is what rays go through.
     void make_scenes() {
         Random& random = case_.random;
-        const SceneOptions options = any_scene_options(random);
+        SceneOptions options = any_scene_options(random);
         std::vector<std::vector<Shown>> lists;
         std::vector<std::uint32_t> paths(meshes_.size(), 0);
         for (std::size_t i = 0; i < meshes_.size(); ++i) {
@@ -190,20 +213,30 @@ private:
             typename Kit::Scene scene;
             std::vector<Shown> list;
             std::uint32_t number = 0;
-            const std::uint32_t instances = 1 + random.below(5);
+            // Of many that each place one mesh a few may move within the tree of the last commit.
+            const bool moves = g == count && random.chance(0.3);
+            const std::uint32_t instances = moves ? 16 + random.below(24) : 1 + random.below(5);
+            std::vector<Member> members;
             for (std::uint32_t k = 0; k < instances; ++k) {
-                const std::uint32_t what = random.below(scenes_.size());
-                const auto map = any_transform<typename Kit::Map>(random);
-                const std::uint32_t mask = random.chance(0.5) ? 0xFFFFFFFFu : random.below(8);
-                scene.add(scenes_[what], map, {.mask = mask, .id = {}});
+                const std::size_t shown = moves ? meshes_.size() : scenes_.size();
+                members.push_back(any_member(random.below(static_cast<std::uint32_t>(shown))));
+                scene.add(scenes_[members[k].what], members[k].map,
+                          {.mask = members[k].mask, .id = {}});
+            }
+            if (moves) {
+                options.usage = Usage::moving;
+                options.refit_limit = random.chance(0.5) ? 1e30 : 1.5;
+                move_some(scene, options, members);
+            }
+            for (const Member& member : members) {
                 ++number;
-                for (Shown shown : lists[what]) {
+                for (Shown shown : lists[member.what]) {
                     shown.number += number;
-                    shown.way.insert(shown.way.begin(), *inverse_of(affine_of(map)));
-                    shown.masks.push_back(mask);
+                    shown.way.insert(shown.way.begin(), *inverse_of(affine_of(member.map)));
+                    shown.masks.push_back(member.mask);
                     list.push_back(std::move(shown));
                 }
-                number += paths[what];
+                number += paths[member.what];
             }
             scene.commit(options);
             scenes_.push_back(std::move(scene));

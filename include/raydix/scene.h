@@ -30,7 +30,8 @@ struct BasicSceneTraceOptions;
 enum class Usage : std::uint32_t {
     fixed = 0,  // little. Meshes share trees; a change of one builds their tree again
     /// Much. Each mesh has a tree; a commit refits or builds those that changed. With both, from a
-    /// mesh's second tree on, memory of one more, of its vertices and of its builds is kept.
+    /// mesh's second tree on, memory of one more, of its vertices and of its builds is kept. Where
+    /// nothing but few instances moved, a commit works on what is above them alone.
     moving = 1,
 };
 

@@ -20,9 +20,6 @@ namespace {
 
 using Geometry = SceneInternals::State::Geometry;
 
-/// Parts whose error is larger stand in a tree of their own.
-constexpr double wild_error = 0x1p-12;
-
 /// Trees of triangles in float (mesh_commit.h).
 struct WideMaker {
     Recycler<WideBvhBuilder> builders;  // copies share what is kept
@@ -258,7 +255,7 @@ private:
         std::vector<std::uint32_t> near, wild;
         for (std::uint32_t part = 0; part < tree.extents.size(); ++part)
             if (!tree.extents[part].empty())
-                (tree.extents[part].error <= wild_error ? near : wild).push_back(part);
+                (is_wild(tree.extents[part]) ? wild : near).push_back(part);
         const auto make = [&](const std::vector<std::uint32_t>& parts, PartTree SceneTree::*which) {
             const PartTree* const old = last == nullptr ? nullptr : &(last->*which);
             if (old != nullptr &&

@@ -58,6 +58,13 @@ inline Extent unite(const Extent& a, const Extent& b) {
     return {unite(a.box, b.box), std::max(a.error, b.error)};
 }
 
+/// Whether what `all` is around may be less once `one` of them has become `now`.
+inline bool may_shrink(const Extent& all, const Extent& one, const Extent& now) {
+    const auto at = [](Vec3 a, Vec3 b) { return a.x == b.x || a.y == b.y || a.z == b.z; };
+    return at(all.box.lo, one.box.lo) || at(all.box.hi, one.box.hi) ||
+           (one.error == all.error && now.error < one.error);
+}
+
 /// Largest sum of a row's magnitudes.
 inline double norm_of(const Affine& a) {
     const auto sum = [](Double3 row) {

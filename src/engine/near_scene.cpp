@@ -238,14 +238,14 @@ NearWay compose(const NearWay& outer, const NearWay& inner) {
 
 const NearScene& near_scene_of(const SceneTree& scene) {
     // A thread that waits for loops in it must not take up another query of the same scene.
-    std::call_once(scene.near_asked, [&] {
+    std::call_once(scene.later->near_asked, [&] {
         isolated([&] {
             auto near = std::make_shared<NearScene>();
             NearSceneMaker(scene, *near).run();
-            scene.near_known = std::move(near);
+            scene.later->near = std::move(near);
         });
     });
-    return *scene.near_known;
+    return *scene.later->near;
 }
 
 }  // namespace raydix

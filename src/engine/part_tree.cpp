@@ -67,12 +67,16 @@ double area_of(std::span<const BvhNode> slots) {
 
 void set_view(PartTree& out) { out.view = view_of(out.arrays); }
 
-void set_growth(std::span<const std::uint32_t> parts, std::span<const Extent> extents,
-                PartTree& out) {
-    double error = 0;
-    for (const std::uint32_t part : parts) error = std::max(error, extents[part].error);
+/// `error`: the largest of all parts.
+void set_growth(double error, PartTree& out) {
     out.growth.rate = std::nextafterf(static_cast<float>(error + float_rounding), infinity);
     out.growth.least = static_cast<float>(float_rounding * largest_coordinate(out.arrays.bounds));
+}
+
+Extent extent_of_all(std::span<const std::uint32_t> parts, std::span<const Extent> extents) {
+    Extent all;
+    for (const std::uint32_t part : parts) all = unite(all, extents[part]);
+    return all;
 }
 
 /// Whether a tree holds these parts, and no others.
@@ -133,6 +137,19 @@ std::vector<std::size_t> levels_of(const PartTree& tree) {
     return begins;
 }
 
+bool are_same(const Aabb& a, const Aabb& b) { return a.lo == b.lo && a.hi == b.hi; }
+bool holds(const Aabb& box, Vec3 p) { return are_same(unite(box, {p, p}), box); }
+
+/// Around the children of a node, and their areas.
+struct Around {
+    Aabb box = empty_box();
+    double area;
+
+    explicit Around(std::span<const BvhNode> slots) : area(area_of(slots)) {
+        for (const BvhNode& child : slots) box = unite(box, {child.lo, child.hi});
+    }
+};
+
 /// box_of(part): where it is now.
 template <class BoxOf>
 bool refit_nodes(const PartTree& old, const BoxOf& box_of, double limit, PartTree& out) {
@@ -151,10 +168,9 @@ bool refit_nodes(const PartTree& old, const BoxOf& box_of, double limit, PartTre
             [&](std::size_t k) {
                 const std::size_t w = begin + k;
                 const auto slots = slots_of(old, w, box_of, boxes);
-                Aabb box = empty_box();
-                for (const BvhNode& child : slots) box = unite(box, {child.lo, child.hi});
-                boxes[w] = box;
-                areas[w] = area_of(slots);
+                const Around around(slots);
+                boxes[w] = around.box;
+                areas[w] = around.area;
                 set_node(slots, out.arrays.middle, out.arrays.nodes[w]);
             },
             64);
@@ -165,9 +181,99 @@ bool refit_nodes(const PartTree& old, const BoxOf& box_of, double limit, PartTre
     out.arrays.stats.max_depth = old.arrays.stats.max_depth;
     out.part = old.part;
     out.leaves_name_parts = old.leaves_name_parts;
+    out.was_refitted = true;
     set_view(out);
     return true;
 }
+
+std::unique_ptr<PartLinks> links_of(const PartTree& tree, std::span<const Extent> extents) {
+    const std::size_t count = tree.arrays.nodes.size();
+    auto links = std::make_unique<PartLinks>();
+    links->node_of.resize(extents.size());
+    links->parent.resize(count);
+    links->boxes.resize(count);
+    links->areas.resize(count);
+    const auto box_of = [&](std::uint32_t part) { return extents[part].box; };
+    for (std::size_t w = count; w-- > 0;) {  // children have higher numbers
+        const auto slots = slots_of(tree, w, box_of, links->boxes);
+        const Around around(slots);
+        links->boxes[w] = around.box;
+        links->areas[w] = around.area;
+        for (const BvhNode& child : slots) {
+            if (WideTree::is_unused(child)) continue;
+            if (WideTree::is_inner(child)) {
+                links->parent[child.first] = static_cast<std::uint32_t>(w);
+            } else {
+                for (std::uint32_t k = child.first; k < child.first + child.count; ++k)
+                    links->node_of[tree.named(k)] = static_cast<std::uint32_t>(w);
+            }
+        }
+    }
+    links->around = extent_of_all(tree.part, extents);
+    return links;
+}
+
+/// Nodes above parts that moved, changed so that they can be changed back.
+class MovedNodes {
+public:
+    MovedNodes(std::span<const MovedPart> moved, PartTree& tree)
+        : tree_(tree), links_(*tree.links) {
+        waiting_.reserve(moved.size());
+        before_.reserve(std::min(tree.arrays.nodes.size(),
+                                 moved.size() * (std::size_t{tree.arrays.stats.max_depth} + 1)));
+        for (const MovedPart& m : moved) waiting_.push_back(links_.node_of[m.part]);
+        std::ranges::make_heap(waiting_);
+    }
+
+    /// Takes no memory: of each node that is taken out at most its parent comes in.
+    void refit(std::span<const Extent> extents) noexcept {
+        const auto box_of = [&](std::uint32_t part) { return extents[part].box; };
+        while (!waiting_.empty()) {
+            const std::uint32_t w = take_last();
+            const auto slots = slots_of(tree_, w, box_of, links_.boxes);
+            const Around around(slots);
+            before_.push_back({w, links_.boxes[w], links_.areas[w], tree_.arrays.nodes[w]});
+            set_node(slots, tree_.arrays.middle, tree_.arrays.nodes[w]);
+            links_.areas[w] = around.area;
+            if (w != 0 && !are_same(around.box, links_.boxes[w])) {
+                waiting_.push_back(links_.parent[w]);
+                std::ranges::push_heap(waiting_);
+            }
+            links_.boxes[w] = around.box;
+        }
+    }
+
+    void undo() noexcept {
+        for (const Before& b : before_) {
+            links_.boxes[b.node] = b.box;
+            links_.areas[b.node] = b.area;
+            tree_.arrays.nodes[b.node] = b.as_was;
+        }
+    }
+
+private:
+    struct Before {
+        std::uint32_t node;
+        Aabb box;
+        double area;
+        WideNode as_was;
+    };
+
+    /// The deepest that waits, once.
+    std::uint32_t take_last() {
+        const std::uint32_t w = waiting_.front();
+        while (!waiting_.empty() && waiting_.front() == w) {
+            std::ranges::pop_heap(waiting_);
+            waiting_.pop_back();
+        }
+        return w;
+    }
+
+    PartTree& tree_;
+    PartLinks& links_;
+    std::vector<std::uint32_t> waiting_;  // a heap
+    std::vector<Before> before_;
+};
 
 /// `middle`: what planes are about, or null for the middle of the bounds.
 void make_box_tree(std::span<const Aabb> boxes, BuildOptions build, const WideOptions& leaves,
@@ -210,7 +316,7 @@ void build_part_tree(std::span<const std::uint32_t> parts, std::span<const Exten
     for (std::size_t k = 0; k < parts.size(); ++k) boxes[k] = built_box(extents[parts[k]]);
     build_box_tree(boxes, build_of_parts(quality), leaves_of_parts, out);
     for (std::uint32_t& part : out.part) part = parts[part];
-    if (!parts.empty()) set_growth(parts, extents, out);
+    if (!parts.empty()) set_growth(extent_of_all(parts, extents).error, out);
 }
 
 void build_part_tree(std::span<const ExtentD> extents, Quality quality, PartTreeD& out) {
@@ -269,7 +375,40 @@ bool refit_part_tree(const PartTree& old, std::span<const std::uint32_t> parts,
     if (parts.empty() || !holds(old, parts)) return false;
     const auto box_of = [&](std::uint32_t part) { return extents[part].box; };
     if (!refit_nodes(old, box_of, limit, out)) return false;
-    set_growth(parts, extents, out);
+    set_growth(extent_of_all(parts, extents).error, out);
+    return true;
+}
+
+bool refit_moved_parts(std::span<MovedPart> moved, std::span<Extent> extents, double limit,
+                       PartTree& tree) {
+    if (moved.empty()) return true;
+    if (tree.links == nullptr) tree.links = links_of(tree, extents);
+    PartLinks& links = *tree.links;
+    MovedNodes nodes(moved, tree);
+    Extent around = links.around;
+    bool less = false;
+    for (const MovedPart& m : moved) {
+        less = less || may_shrink(links.around, extents[m.part], m.extent);
+        around = unite(around, m.extent);
+    }
+    const auto exchange = [&] {
+        for (MovedPart& m : moved) std::swap(m.extent, extents[m.part]);
+    };
+    exchange();
+    if (less) around = extent_of_all(tree.part, extents);
+    nodes.refit(extents);
+    if (!holds(around.box, tree.arrays.middle) ||
+        !(cost_of(links.areas, around.box) <= limit * tree.cost_at_build)) {
+        nodes.undo();
+        exchange();
+        return false;
+    }
+    if (!are_same(around.box, links.around.box)) {
+        tree.arrays.set_bounds(around.box, tree.arrays.middle);
+        set_view(tree);
+    }
+    set_growth(around.error, tree);
+    links.around = around;
     return true;
 }
 

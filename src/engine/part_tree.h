@@ -10,6 +10,9 @@
 
 namespace raydix {
 
+/// Parts whose error is larger than this stand in a tree of their own.
+inline bool is_wild(const Extent& extent) { return !(extent.error <= 0x1p-12); }
+
 /// `parts`: those that the tree holds, not empty and in the range of coordinates; extents [all
 /// parts].
 void build_part_tree(std::span<const std::uint32_t> parts, std::span<const Extent> extents,
@@ -19,6 +22,20 @@ void build_part_tree(std::span<const std::uint32_t> parts, std::span<const Exten
 /// other parts, or if its cost would be more than `limit` times that at its build.
 [[nodiscard]] bool refit_part_tree(const PartTree& old, std::span<const std::uint32_t> parts,
                                    std::span<const Extent> extents, double limit, PartTree& out);
+
+/// A part that moved, and where it is: as long as the refit has not succeeded, the new place.
+struct MovedPart {
+    std::uint32_t part;
+    Extent extent;
+};
+
+/// Refits `tree` in place where few parts moved. Each of them stands in the tree, once in `moved`.
+/// Planes of nodes stay about the same point, also where the bounds change; all else is as after
+/// refit_part_tree, `extents` has the new places and `moved` the old ones. False, and all is as
+/// before: the bounds do not hold that point any more, or the cost would be more than `limit` times
+/// that at the build.
+[[nodiscard]] bool refit_moved_parts(std::span<MovedPart> moved, std::span<Extent> extents,
+                                     double limit, PartTree& tree);
 
 /// In double: [parts], those that are empty are left out and the others must be in range.
 void build_part_tree(std::span<const ExtentD> extents, Quality quality, PartTreeD& out);

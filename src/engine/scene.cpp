@@ -19,6 +19,7 @@
 #include "base/float_env.h"
 #include "base/options.h"
 #include "engine/commit.h"
+#include "engine/moved_instances.h"
 #include "engine/scene_state.h"
 #include "engine/settled.h"
 #include "exec/large_pages.h"
@@ -199,7 +200,7 @@ std::uint32_t insert(State& state, std::uint32_t id, typename State::Geometry ge
         state.taken.erase(state.taken.begin());
         ++state.next_id;
     }
-    state.changed = true;
+    state.note_change();
     return id;
 }
 
@@ -233,7 +234,7 @@ void update_shapes(State& state, std::uint32_t id, const BasicShapes<Scalar>& sh
         throw InputError(name_of(id) + " is " + what_is(geometry) + ", not " + kind_of(shapes));
     check_count(name_of(id), count_of(shapes), "primitives");
     set_shapes<typename State::Geometry, Scalar>(geometry, shapes);
-    state.changed = true;
+    state.note_change();
 }
 
 std::optional<SceneKind<float>::WayBack> way_back(const Transform& transform) {
@@ -285,6 +286,26 @@ void BasicScene<Scalar>::State::put_in_a_row() {
 }
 
 template <class Scalar>
+void BasicScene<Scalar>::State::note_change() noexcept {
+    changed = true;
+    only_moved = false;
+    moved.clear();
+}
+
+template <class Scalar>
+void BasicScene<Scalar>::State::note_move(std::uint32_t id) noexcept {
+    if (!changed) only_moved = true;
+    changed = true;
+    if (!only_moved) return;
+    try {
+        if (moved.size() >= geometries.size()) return note_change();
+        moved.push_back(id);
+    } catch (const std::bad_alloc&) {
+        note_change();
+    }
+}
+
+template <class Scalar>
 void BasicScene<Scalar>::State::take(std::shared_ptr<const typename SceneKind<Scalar>::Tree> made,
                                      const CommitReport& told, double limit) {
     auto scenes = scenes_below(geometries, *made);  // no memory: the last commit still stands
@@ -294,7 +315,8 @@ void BasicScene<Scalar>::State::take(std::shared_ptr<const typename SceneKind<Sc
     refit_limit = limit;
     for (const auto& mesh : tree->mesh_names) at(mesh.id).changed = false;
     for (const auto& shapes : tree->shapes) at(shapes->id).changed = false;
-    changed = false;
+    changed = only_moved = false;
+    moved.clear();
 }
 
 template <class Scalar>
@@ -401,7 +423,7 @@ void BasicScene<Scalar>::remove(std::uint32_t id) {
     static_cast<void>(state_->at(id));
     state_->in_a_row.clear();
     state_->geometries.erase(id);
-    state_->changed = true;
+    state_->note_change();
 }
 
 template <class Scalar>
@@ -415,7 +437,7 @@ void BasicScene<Scalar>::update(std::uint32_t id, const MeshView& mesh) {
     if (!same_triangles || mesh.vertices.size() < geometry.mesh.vertices.size())
         check_mesh(name_of(id), mesh);
     set_mesh(geometry, mesh, geometry.shared, same_triangles);
-    state_->changed = true;
+    state_->note_change();
 }
 
 template <class Scalar>
@@ -441,13 +463,17 @@ void BasicScene<Scalar>::set_transform(std::uint32_t id, const Transform& transf
     if (!geometry.is_instance())
         throw InputError(name_of(id) + " is " + what_is(geometry) + ", not an instance");
     BasicSceneInternals<Scalar>::place(id, transform, geometry);
-    state_->changed = true;
+    state_->note_move(id);
 }
 
 template <class Scalar>
 void BasicScene<Scalar>::set_mask(std::uint32_t id, std::uint32_t mask) {
-    state_->at(id).mask = mask;
-    state_->changed = true;
+    auto& geometry = state_->at(id);
+    geometry.mask = mask;
+    if (geometry.is_instance())
+        state_->note_move(id);
+    else
+        state_->note_change();
 }
 
 template <class Scalar>
@@ -460,8 +486,10 @@ CommitReport BasicScene<Scalar>::commit(const SceneOptions& options) {
     const auto start = std::chrono::steady_clock::now();
     CommitReport report;
     state_->put_in_a_row();
-    auto tree = make_scene_tree(*state_, options, report);
-    if (tree != state_->tree) state_->take(std::move(tree), report, options.refit_limit);
+    if (!take_moves(*state_, options, report)) {
+        auto tree = make_scene_tree(*state_, options, report);
+        if (tree != state_->tree) state_->take(std::move(tree), report, options.refit_limit);
+    }
     const std::chrono::duration<double, std::milli> ms = std::chrono::steady_clock::now() - start;
     report.ms = ms.count();
     return report;

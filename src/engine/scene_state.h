@@ -84,7 +84,10 @@ struct BasicScene<Scalar>::State {
     std::vector<std::pair<std::uint32_t, Geometry*>> in_a_row;
     std::uint64_t next_id = 0;      // all below were given once
     std::set<std::uint32_t> taken;  // those above, chosen by the caller
-    bool changed = true;
+    bool changed = true;            // anything, since the last commit
+    /// If no more than transforms and masks of instances changed: of which. Some may be twice.
+    bool only_moved = false;
+    std::vector<std::uint32_t> moved;
     std::shared_ptr<const typename SceneKind<Scalar>::Tree> tree;  // null before the first commit
     /// Of the commit that made `tree`: what it told, its limit, and the scenes that instances
     /// place, each once, with their trees. No report of a tree that came from a file.
@@ -94,6 +97,8 @@ struct BasicScene<Scalar>::State {
 
     [[nodiscard]] Geometry& at(std::uint32_t id);
     void put_in_a_row();
+    void note_change() noexcept;
+    void note_move(std::uint32_t id) noexcept;
     /// use(id, geometry) for each, by ascending id.
     template <class Use>
     void for_each(const Use& use) const {

@@ -1,5 +1,6 @@
 // What a commit makes of a scene: trees over triangles, and a tree over those and the instances.
-// Nothing in it changes afterwards, so that any number of threads and of other scenes may use it.
+// Nothing in it changes while anyone but its scene holds it, so that any number of threads and of
+// other scenes may use it (moved_instances.h).
 #pragma once
 
 #include <raydix/buffer.h>
@@ -85,6 +86,15 @@ struct InstanceName {
     std::shared_ptr<const SceneTree> scene;
 };
 
+/// What it takes to refit the nodes above a few parts alone.
+struct PartLinks {
+    std::vector<std::uint32_t> node_of;  // [parts] the one whose leaf it is in
+    std::vector<std::uint32_t> parent;   // [nodes]
+    std::vector<Aabb> boxes;             // [nodes] around all children
+    std::vector<double> areas;           // [nodes] of all children's boxes
+    Extent around;                       // all parts
+};
+
 /// A wide tree over parts, most often with one of them a leaf. The parts of a scene are numbered:
 /// mesh trees first, then trees of shapes, then placed scenes.
 struct PartTree {
@@ -93,7 +103,9 @@ struct PartTree {
     std::vector<std::uint32_t> part;  // by the place that leaves name
     bool leaves_name_parts = false;   // not their places: one part a leaf
     PadGrowth growth;
-    double cost_at_build = 0;  // areas of all children's boxes in those of the root's
+    double cost_at_build = 0;          // areas of all children's boxes in those of the root's
+    bool was_refitted = false;         // since its build
+    std::unique_ptr<PartLinks> links;  // once a few parts moved; null before
 
     /// What a leaf names.
     [[nodiscard]] std::uint32_t named(std::uint32_t place) const {
@@ -128,17 +140,19 @@ struct SceneTree {
 
     /// Made when the first instance asks for it.
     [[nodiscard]] const Support& support() const {
-        std::call_once(support_asked, [&] { support_known = support_of(*this); });
-        return support_known;
+        std::call_once(later->support_asked, [&] { later->support = support_of(*this); });
+        return later->support;
     }
     mutable PathRates rates;  // of batches so far
     /// What trees of meshes were built in, once a mesh's tree was built again.
     Recycler<WideBvhBuilder> builders;
-    mutable std::once_flag support_asked;
-    mutable Support support_known;
-    /// What queries of distance need besides, made when the first of them asks (near_scene_of).
-    mutable std::once_flag near_asked;
-    mutable std::shared_ptr<const NearScene> near_known;
+    /// What is made of all this when it is first asked for.
+    struct Later {
+        std::once_flag support_asked, near_asked;
+        Support support;
+        std::shared_ptr<const NearScene> near;  // for queries of distance (near_scene_of)
+    };
+    std::unique_ptr<Later> later = std::make_unique<Later>();
 
     /// The only mesh tree, if rays need nothing else.
     [[nodiscard]] const MeshTree* only_mesh() const {

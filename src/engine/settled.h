@@ -10,15 +10,21 @@
 
 namespace raydix {
 
-/// Whether a commit would make the tree of the last one again.
+/// Whether a commit would make the tree of the last one again if the scene itself had not changed.
 template <class State>
-bool is_settled(const State& state, const SceneOptions& options) {
-    if (state.changed || !state.report || options.quality != state.tree->quality ||
+bool is_settled_below(const State& state, const SceneOptions& options) {
+    if (!state.report || options.quality != state.tree->quality ||
         options.usage != state.tree->usage || options.compact != state.tree->compact ||
         options.refit_limit != state.refit_limit || (options.strict && state.report->left_out != 0))
         return false;
     return std::ranges::all_of(state.below,
                                [](const auto& one) { return one.first->tree.get() == one.second; });
+}
+
+/// Whether a commit would make the tree of the last one again.
+template <class State>
+bool is_settled(const State& state, const SceneOptions& options) {
+    return !state.changed && is_settled_below(state, options);
 }
 
 /// State::below of a scene that has these geometries and this tree.

@@ -17,7 +17,7 @@ QUESTIONS = {
     "all_hits": ["primary all hits", "random all hits"],
     "filters": [f"{kind} accept {part}" for part in ("all", "half") for kind in KINDS],
     "closest": ["near", "far"],
-    "moved": ["commit", "transforms and commit"],
+    "moved": ["commit", "transforms and commit", "transforms of 1 %, commit"],
     "fixed": KINDS,
     "frames": ["frame"], "frame parts": ["commit", "primary", "ao"],
 }

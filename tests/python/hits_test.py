@@ -202,20 +202,22 @@ def test_attributes_while_others_commit():
     orders = [[0, 1, 2]], [[1, 2, 0]], [[2, 0, 1]]
     scene = raydix.Scene(corners, orders[0])
     scene.set_attributes(0, height=heights)
-    ended = threading.Event()
+    counts, ended = [0, 0], threading.Event()
 
-    def change():
-        for k in range(400):
-            scene.update(0, corners, orders[k % 3])
+    def change(which):
+        while not ended.is_set():
+            scene.update(0, corners, orders[counts[which] % 3])
             scene.commit()
-        ended.set()
+            counts[which] += 1
 
-    writers = [threading.Thread(target=change) for _ in range(2)]
+    writers = [threading.Thread(target=change, args=[which]) for which in range(2)]
     for writer in writers:
         writer.start()
-    found = set()
-    while not ended.is_set():
+    found, rays = set(), 0
+    while min(counts) < 400 or rays < 100:  # a busy machine may let either wait for long
         found.add(float(scene.intersect([0.5, 0.25, -1, 0, 0, 1], also="height").height))
+        rays += 1
+    ended.set()
     for writer in writers:
         writer.join()
     assert found == {10.0}
