@@ -9,6 +9,7 @@
 #include "base/options.h"
 #include "engine/part_tree.h"
 #include "engine/settled.h"
+#include "exec/progress.h"
 
 namespace raydix {
 namespace {
@@ -37,9 +38,16 @@ public:
         return true;
     }
 
-    [[nodiscard]] bool apply(double limit) {
+    /// False, and all is as before, if the tree must be made anew. Throws what options.progress
+    /// throws, and then all is as before too.
+    [[nodiscard]] bool apply(const SceneOptions& options) {
+        PartMoves parts(parts_, tree_.extents, tree_.near);
         auto later = std::make_unique<SceneTree::Later>();
-        if (!refit_moved_parts(parts_, tree_.extents, limit, tree_.near)) return false;
+        if (!parts.plan(options.refit_limit)) return false;
+        ProgressListener listener(options.progress);
+        listener.reach(0);
+        listener.finish();
+        parts.apply();
         unite_extents();
         for (const Move& move : moves_) {
             InstanceName& name = tree_.instances[move.instance];
@@ -118,15 +126,13 @@ private:
 
 bool take_moves(State& state, const SceneOptions& options, CommitReport& report) {
     check_threads(options.threads);
-    // A listener may end a commit when all is done.
-    if (!state.only_moved || options.progress || options.usage != Usage::moving ||
-        options.refit_limit < 1 || state.tree.use_count() != 1)
+    if (!state.only_moved || options.usage != Usage::moving || options.refit_limit < 1 ||
+        state.tree.use_count() != 1 || !is_settled_below(state, options))
         return false;
-    if (!is_settled_below(state, options)) return false;
     const FloatEnvironment plain;
     auto& tree = const_cast<SceneTree&>(*state.tree);  // no constant object, and nobody else's
     Moves moves(state, tree);
-    if (!moves.plan() || !moves.apply(options.refit_limit)) return false;
+    if (!moves.plan() || !moves.apply(options)) return false;
     report = report_of_no_change(*state.report);
     report.parts_refitted = !tree.near.empty() || !tree.wild.empty();
     state.report = report;

@@ -213,68 +213,6 @@ std::unique_ptr<PartLinks> links_of(const PartTree& tree, std::span<const Extent
     return links;
 }
 
-/// Nodes above parts that moved, changed so that they can be changed back.
-class MovedNodes {
-public:
-    MovedNodes(std::span<const MovedPart> moved, PartTree& tree)
-        : tree_(tree), links_(*tree.links) {
-        waiting_.reserve(moved.size());
-        before_.reserve(std::min(tree.arrays.nodes.size(),
-                                 moved.size() * (std::size_t{tree.arrays.stats.max_depth} + 1)));
-        for (const MovedPart& m : moved) waiting_.push_back(links_.node_of[m.part]);
-        std::ranges::make_heap(waiting_);
-    }
-
-    /// Takes no memory: of each node that is taken out at most its parent comes in.
-    void refit(std::span<const Extent> extents) noexcept {
-        const auto box_of = [&](std::uint32_t part) { return extents[part].box; };
-        while (!waiting_.empty()) {
-            const std::uint32_t w = take_last();
-            const auto slots = slots_of(tree_, w, box_of, links_.boxes);
-            const Around around(slots);
-            before_.push_back({w, links_.boxes[w], links_.areas[w], tree_.arrays.nodes[w]});
-            set_node(slots, tree_.arrays.middle, tree_.arrays.nodes[w]);
-            links_.areas[w] = around.area;
-            if (w != 0 && !are_same(around.box, links_.boxes[w])) {
-                waiting_.push_back(links_.parent[w]);
-                std::ranges::push_heap(waiting_);
-            }
-            links_.boxes[w] = around.box;
-        }
-    }
-
-    void undo() noexcept {
-        for (const Before& b : before_) {
-            links_.boxes[b.node] = b.box;
-            links_.areas[b.node] = b.area;
-            tree_.arrays.nodes[b.node] = b.as_was;
-        }
-    }
-
-private:
-    struct Before {
-        std::uint32_t node;
-        Aabb box;
-        double area;
-        WideNode as_was;
-    };
-
-    /// The deepest that waits, once.
-    std::uint32_t take_last() {
-        const std::uint32_t w = waiting_.front();
-        while (!waiting_.empty() && waiting_.front() == w) {
-            std::ranges::pop_heap(waiting_);
-            waiting_.pop_back();
-        }
-        return w;
-    }
-
-    PartTree& tree_;
-    PartLinks& links_;
-    std::vector<std::uint32_t> waiting_;  // a heap
-    std::vector<Before> before_;
-};
-
 /// `middle`: what planes are about, or null for the middle of the bounds.
 void make_box_tree(std::span<const Aabb> boxes, BuildOptions build, const WideOptions& leaves,
                    const Vec3* middle, PartTree& out) {
@@ -379,37 +317,88 @@ bool refit_part_tree(const PartTree& old, std::span<const std::uint32_t> parts,
     return true;
 }
 
-bool refit_moved_parts(std::span<MovedPart> moved, std::span<Extent> extents, double limit,
-                       PartTree& tree) {
-    if (moved.empty()) return true;
+PartMoves::PartMoves(std::span<MovedPart> moved, std::span<Extent> extents, PartTree& tree)
+    : moved_(moved), extents_(extents), tree_(tree) {
+    if (moved.empty()) return;
     if (tree.links == nullptr) tree.links = links_of(tree, extents);
-    PartLinks& links = *tree.links;
-    MovedNodes nodes(moved, tree);
-    Extent around = links.around;
+    waiting_.reserve(moved.size());
+    nodes_.reserve(std::min(tree.arrays.nodes.size(),
+                            moved.size() * (std::size_t{tree.arrays.stats.max_depth} + 1)));
+    for (const MovedPart& m : moved) waiting_.push_back(tree.links->node_of[m.part]);
+    std::ranges::make_heap(waiting_);
+}
+
+bool PartMoves::plan(double limit) noexcept {
+    if (moved_.empty()) return true;
+    const PartLinks& links = *tree_.links;
+    around_ = links.around;
     bool less = false;
-    for (const MovedPart& m : moved) {
-        less = less || may_shrink(links.around, extents[m.part], m.extent);
-        around = unite(around, m.extent);
+    for (const MovedPart& m : moved_) {
+        less = less || may_shrink(links.around, extents_[m.part], m.extent);
+        around_ = unite(around_, m.extent);
     }
-    const auto exchange = [&] {
-        for (MovedPart& m : moved) std::swap(m.extent, extents[m.part]);
-    };
-    exchange();
-    if (less) around = extent_of_all(tree.part, extents);
-    nodes.refit(extents);
-    if (!holds(around.box, tree.arrays.middle) ||
-        !(cost_of(links.areas, around.box) <= limit * tree.cost_at_build)) {
-        nodes.undo();
-        exchange();
-        return false;
+    exchange_extents();
+    if (less) around_ = extent_of_all(tree_.part, extents_);
+    refit();
+    const bool good = holds(around_.box, tree_.arrays.middle) &&
+                      cost_of(links.areas, around_.box) <= limit * tree_.cost_at_build;
+    exchange_nodes();
+    exchange_extents();
+    return good;
+}
+
+void PartMoves::apply() noexcept {
+    if (moved_.empty()) return;
+    exchange_extents();
+    exchange_nodes();
+    if (!are_same(around_.box, tree_.links->around.box)) {
+        tree_.arrays.set_bounds(around_.box, tree_.arrays.middle);
+        set_view(tree_);
     }
-    if (!are_same(around.box, links.around.box)) {
-        tree.arrays.set_bounds(around.box, tree.arrays.middle);
-        set_view(tree);
+    set_growth(around_.error, tree_);
+    tree_.links->around = around_;
+}
+
+/// Takes no memory: for each node that is taken out at most its parent comes in.
+void PartMoves::refit() noexcept {
+    PartLinks& links = *tree_.links;
+    const auto box_of = [&](std::uint32_t part) { return extents_[part].box; };
+    while (!waiting_.empty()) {
+        const std::uint32_t w = take_last();
+        const auto slots = slots_of(tree_, w, box_of, links.boxes);
+        const Around around(slots);
+        nodes_.push_back({w, links.boxes[w], links.areas[w], tree_.arrays.nodes[w]});
+        set_node(slots, tree_.arrays.middle, tree_.arrays.nodes[w]);
+        links.areas[w] = around.area;
+        if (w != 0 && !are_same(around.box, links.boxes[w])) {
+            waiting_.push_back(links.parent[w]);
+            std::ranges::push_heap(waiting_);
+        }
+        links.boxes[w] = around.box;
     }
-    set_growth(around.error, tree);
-    links.around = around;
-    return true;
+}
+
+/// The deepest that waits, once.
+std::uint32_t PartMoves::take_last() noexcept {
+    const std::uint32_t w = waiting_.front();
+    while (!waiting_.empty() && waiting_.front() == w) {
+        std::ranges::pop_heap(waiting_);
+        waiting_.pop_back();
+    }
+    return w;
+}
+
+void PartMoves::exchange_extents() noexcept {
+    for (MovedPart& m : moved_) std::swap(m.extent, extents_[m.part]);
+}
+
+void PartMoves::exchange_nodes() noexcept {
+    PartLinks& links = *tree_.links;
+    for (Node& node : nodes_) {
+        std::swap(node.box, links.boxes[node.number]);
+        std::swap(node.area, links.areas[node.number]);
+        std::swap(node.node, tree_.arrays.nodes[node.number]);
+    }
 }
 
 bool refit_box_tree(const PartTree& old, std::span<const Aabb> boxes, double limit, PartTree& out) {

@@ -23,19 +23,47 @@ void build_part_tree(std::span<const std::uint32_t> parts, std::span<const Exten
 [[nodiscard]] bool refit_part_tree(const PartTree& old, std::span<const std::uint32_t> parts,
                                    std::span<const Extent> extents, double limit, PartTree& out);
 
-/// A part that moved, and where it is: as long as the refit has not succeeded, the new place.
 struct MovedPart {
     std::uint32_t part;
     Extent extent;
 };
 
-/// Refits `tree` in place where few parts moved. Each of them stands in the tree, once in `moved`.
-/// Planes of nodes stay about the same point, also where the bounds change; all else is as after
-/// refit_part_tree, `extents` has the new places and `moved` the old ones. False, and all is as
-/// before: the bounds do not hold that point any more, or the cost would be more than `limit` times
-/// that at the build.
-[[nodiscard]] bool refit_moved_parts(std::span<MovedPart> moved, std::span<Extent> extents,
-                                     double limit, PartTree& tree);
+/// A refit of a tree in place where few parts moved.
+class PartMoves {
+public:
+    /// moved: each part stands in the tree, and once here, with its new place; extents [all parts]:
+    /// where they were.
+    PartMoves(std::span<MovedPart> moved, std::span<Extent> extents, PartTree& tree);
+
+    /// Whether it can be done. The tree and `extents` are as before. False: the bounds do not hold
+    /// the point any more that planes are about, or the cost would be more than `limit` times that
+    /// at the build.
+    [[nodiscard]] bool plan(double limit) noexcept;
+    /// Once, after a plan that can be done. Planes of nodes stay about the same point, also where
+    /// the bounds change. All else is as after refit_part_tree; `extents` has the new places and
+    /// `moved` the old ones.
+    void apply() noexcept;
+
+private:
+    struct Node {  // that changes, with what it has when the other state is in the tree
+        std::uint32_t number;
+        Aabb box;
+        double area;
+        WideNode node;
+    };
+
+    void refit() noexcept;
+    std::uint32_t take_last() noexcept;
+    void exchange_extents() noexcept;
+    void exchange_nodes() noexcept;
+
+    std::span<MovedPart> moved_;
+    std::span<Extent> extents_;
+    PartTree& tree_;
+    std::vector<std::uint32_t> waiting_;  // numbers of nodes, a heap
+    std::vector<Node> nodes_;
+    Extent around_;  // all parts
+};
 
 /// In double: [parts], those that are empty are left out and the others must be in range.
 void build_part_tree(std::span<const ExtentD> extents, Quality quality, PartTreeD& out);

@@ -9,6 +9,8 @@
 #include <raydix/trace.h>
 
 #include <cstring>
+#include <memory>
+#include <stdexcept>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -22,11 +24,6 @@ namespace raydix::test {
 namespace {
 
 const SceneOptions moving{.usage = Usage::moving, .refit_limit = 1.5};
-
-SceneOptions with_listener(SceneOptions options) {
-    options.progress = [](double) {};  // which keeps a commit from changing its tree in place
-    return options;
-}
 
 Mesh pyramid() {
     return {"",
@@ -98,11 +95,10 @@ struct Twins {
 
     /// Whether the first scene changed its tree.
     bool commit(const SceneOptions& options) {
-        const auto tree = [&] { return SceneInternals::tree(in_place).get(); };
-        const SceneTree* const before = in_place.committed() || count == 0 ? nullptr
-                                        : known                            ? tree()
-                                                                           : nullptr;
-        const CommitReport a = in_place.commit(options), b = anew.commit(with_listener(options));
+        const SceneTree* const before = known ? SceneInternals::tree(in_place).get() : nullptr;
+        // Who else holds a tree keeps it from being changed.
+        const auto held = known ? SceneInternals::tree(anew) : nullptr;
+        const CommitReport a = in_place.commit(options), b = anew.commit(options);
         EXPECT_EQ(a.parts_refitted, b.parts_refitted);
         EXPECT_EQ(
             std::tuple(a.meshes, a.instances, a.triangles, a.shapes, a.primitives, a.left_out),
@@ -111,7 +107,7 @@ struct Twins {
                   std::tuple(b.trees_built, b.trees_refitted, b.sah_ratio, b.bytes, b.paths));
         EXPECT_TRUE(in_place.committed());
         known = true;
-        return tree() == before;
+        return SceneInternals::tree(in_place).get() == before;
     }
     bool known = false;
 
@@ -286,6 +282,38 @@ TEST(MovedInstances, LeaveOtherScenesWhatTheyTook) {
     again.commit(), wanted.commit();
     const Aabb a = again.bounds(), b = wanted.bounds();
     EXPECT_EQ(std::memcmp(&a, &b, sizeof a), 0);
+}
+
+TEST(MovedInstances, TellListenersWhoMayEndTheCommit) {
+    Twins twins(5);
+    for (int k = 0; k < 3; ++k) {
+        twins.commit(moving);
+        twins.nudge(3, 0.1f);
+    }
+    SceneOptions heard = moving;
+    std::vector<double> parts;
+    heard.progress = [&](double part) { parts.push_back(part); };
+    EXPECT_TRUE(twins.commit(heard));
+    EXPECT_EQ(parts.front(), 0);
+    EXPECT_EQ(parts.back(), 1);
+    for (const double end : {0.0, 1.0}) {
+        const Transform home = twins.places[3];
+        twins.places[3].m[1][3] += 0.2f;
+        twins.in_place.set_transform(twins.ids[3], twins.places[3]);
+        heard.progress = [end](double part) {
+            if (part == end) throw std::runtime_error("enough");
+        };
+        EXPECT_THROW(twins.in_place.commit(heard), std::runtime_error);
+        EXPECT_FALSE(twins.in_place.committed());
+        const SceneTree& tree = *SceneInternals::tree(twins.in_place);
+        EXPECT_EQ(tree.instances[3].transform.m[1][3], home.m[1][3]);
+        const Aabb box = twins.in_place.bounds(), wanted = twins.anew.bounds();
+        EXPECT_EQ(std::memcmp(&box, &wanted, sizeof box), 0);
+        twins.compare();  // anew never heard of it
+        twins.anew.set_transform(twins.ids[3], twins.places[3]);
+        EXPECT_TRUE(twins.commit(moving));
+        twins.compare();
+    }
 }
 
 TEST(MovedInstances, ThatAreRefusedLeaveTheLastCommit) {
