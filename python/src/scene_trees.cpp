@@ -154,6 +154,7 @@ std::uint32_t BasicSceneTrees<Names>::add(Arrays mesh, const GeometryOptions& op
     Geometry made{.mask = options.mask,
                   .mesh = std::move(mesh),
                   .attributes = std::make_shared<MeshAttributes>()};
+    members_changed_ = true;
     const std::uint32_t id = scene_.share(made.mesh.view(), options);
     try {
         geometries_.emplace(id, std::move(made));
@@ -175,6 +176,7 @@ std::vector<std::uint32_t> BasicSceneTrees<Names>::add(std::shared_ptr<BasicScen
     const Writing lock("add", locks_);
     settle();
     const std::lock_guard all(structure());
+    members_changed_ = true;
     std::vector<std::uint32_t> ids;
     ids.reserve(transforms.size());
     try {
@@ -214,6 +216,7 @@ void BasicSceneTrees<Names>::remove(std::uint32_t id) {
     const Writing lock("remove", locks_);
     settle();
     const std::lock_guard all(structure());
+    members_changed_ = true;
     scene_.remove(id);
     geometries_.erase(id);
 }
@@ -232,6 +235,7 @@ void BasicSceneTrees<Names>::update(std::uint32_t id, Vertices vertices,
         mesh.triangles = std::make_shared<const typename Arrays::Triangles>(std::move(*triangles));
     check_strict(name_of(id), mesh.view());
     auto attributes = geometry.attributes->of(mesh.vertices->size(), mesh.triangles);
+    members_changed_ = true;
     scene_.update(id, mesh.view());
     geometry.attributes = std::move(attributes);
     geometry.mesh = std::move(mesh);
@@ -300,22 +304,35 @@ CommitReport BasicSceneTrees<Names>::commit(const SceneOptions& options) {
     const Writing lock("commit", locks_);
     // The scenes that this one places must stay as they are meanwhile. Past their queues: whoever
     // changes one of them may wait for somebody who waits for this.
-    std::vector<Reading> below;
-    std::set<BasicSceneTrees*> placed;
-    for (const auto& [id, geometry] : geometries_) {
-        if (geometry.scene == nullptr || !placed.insert(geometry.scene.get()).second) continue;
-        below.emplace_back("commit", geometry.scene->locks_);
-        const std::lock_guard build(geometry.scene->locks_.build());
-        geometry.scene->settle();
+    std::vector<Reading> reading;
+    if (members_changed_) below_ = placed_scenes();
+    bool same = !members_changed_;
+    for (const Below& below : below_) {
+        reading.emplace_back("commit", below.scene->locks_);
+        const std::lock_guard build(below.scene->locks_.build());
+        below.scene->settle();
+        same = same && below.kept == below.scene->kept_;
     }
-    auto kept = keep();
+    auto kept = same ? kept_ : keep();
     const CommitReport report = commit_now(options);
+    for (Below& below : below_) below.kept = below.scene->kept_;
+    members_changed_ = false;
     commits_ = options;
     commits_.progress = nullptr;
     unsettled_ = false;
     kept_ = std::move(kept);
     look_for_mesh();
     return report;
+}
+
+template <class Names>
+auto BasicSceneTrees<Names>::placed_scenes() const -> std::vector<Below> {
+    std::vector<Below> below;
+    std::set<const BasicSceneTrees*> known;
+    for (const auto& [id, geometry] : geometries_)
+        if (geometry.scene != nullptr && known.insert(geometry.scene.get()).second)
+            below.push_back({geometry.scene, nullptr});
+    return below;
 }
 
 template <class Names>
@@ -440,6 +457,7 @@ RefitQuality BasicSceneTrees<Names>::refit(Vertices vertices, int threads) {
     }
     try {
         Geometry& geometry = at(*mesh_id_);
+        members_changed_ = true;
         scene_.update(*mesh_id_, moved.view());
         geometry.mesh = moved;  // the scene looks at it from here on, whatever fails
         auto kept = keep();

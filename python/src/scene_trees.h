@@ -288,6 +288,11 @@ private:
         std::vector<std::pair<std::uint32_t, std::shared_ptr<const MeshAttributes>>> attributes;
         std::vector<std::pair<std::uint32_t, std::shared_ptr<const Kept>>> placed;
     };
+    /// A scene that this one places, once for all its instances, and what it kept at the commit.
+    struct Below {
+        std::shared_ptr<BasicSceneTrees> scene;
+        std::shared_ptr<const Kept> kept;
+    };
     struct Geometry {
         bool is_instance = false;
         bool is_shapes = false;  // whose arrays the library has
@@ -311,6 +316,7 @@ private:
     void settle();
     CommitReport commit_now(SceneOptions options);
     /// While writing, with the scenes that are placed held: of all geometries as they are.
+    [[nodiscard]] std::vector<Below> placed_scenes() const;
     [[nodiscard]] std::shared_ptr<const Kept> keep() const;
     void look_for_mesh();
     /// Of this scene and all that it places, each once, `known` aside.
@@ -322,6 +328,8 @@ private:
     std::uint64_t ids_given_ = 0;
     std::map<std::uint32_t, Geometry> geometries_;
     std::shared_ptr<const Kept> kept_ = std::make_shared<const Kept>();
+    bool members_changed_ = true;  // geometries, or arrays of theirs, since the last commit
+    std::vector<Below> below_;     // at the last commit
     std::optional<std::uint32_t> mesh_id_;
     std::uint32_t mesh_mask_ = 0;
     std::optional<typename Names::Refitter> refitter_;
@@ -339,6 +347,7 @@ std::uint32_t BasicSceneTrees<Names>::add_shapes(const Add& add, const GeometryO
     const Writing lock("add", locks_);
     settle();
     const std::lock_guard all(structure());
+    members_changed_ = true;
     const std::uint32_t id = add(scene_, options);
     geometries_[id] = {.is_shapes = true, .mask = options.mask};
     ++ids_given_;

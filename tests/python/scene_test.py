@@ -420,3 +420,33 @@ def test_vertices_of_a_commit_are_kept(rng):
     del leaf
     rng.normal(size=100_000)  # something else where the old arrays were
     assert world.positions(hits).tolist() == [0, 0, 3]
+
+
+@pytest.mark.parametrize("below_changes", [False, True])
+def test_few_moved_instances(rng, below_changes):
+    """Commits of few moves give what a scene made afresh gives, and hits their attributes."""
+    rays = np.concatenate([rng.uniform(-1, 9, (300, 3)), rng.normal(size=(300, 3))], axis=1)
+    leaf = raydix.Scene(*BOX)
+    leaf.set_attributes(0, h=np.arange(8.0))
+    places = np.tile(np.eye(4)[:3], (64, 1, 1))
+    places[:, :, 3] = 2 * np.stack(np.unravel_index(np.arange(64), (4, 4, 4)), axis=1)
+    scene = raydix.Scene()
+    ids = scene.add(leaf, places)
+    scene.commit(usage="moving")
+    for _ in range(6):
+        which = int(rng.integers(64))
+        places[which, :, 3] += rng.uniform(-0.4, 0.4, 3)
+        scene.set_transform(ids[which], places[which])
+        if below_changes:
+            leaf.update(0, leaf.vertices * 0.95, leaf.faces)
+            leaf.commit()
+            leaf.set_attributes(0, h=np.arange(8.0))
+        report = scene.commit(usage="moving")
+        assert report["parts_refitted"] and report["trees_built"] == 0 and report["instances"] == 64
+        fresh = raydix.Scene()
+        fresh.add(leaf, places)
+        fresh.commit()
+        hits, wanted = (s.intersect(rays, also="h") for s in (scene, fresh))
+        assert hits.hit.any()
+        for name in ("t", "prim", "instance", "h"):
+            np.testing.assert_array_equal(hits[name], wanted[name])
