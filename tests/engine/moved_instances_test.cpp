@@ -269,7 +269,7 @@ TEST(MovedInstances, LeaveOtherScenesWhatTheyTook) {
     twins.commit(moving);
     outer.commit();
     for (const Ray& ray : rays) before.push_back(closest_hit(outer, ray));
-    for (std::uint32_t k = 0; k < 15; ++k) twins.nudge(k * 20, 2);
+    for (std::uint32_t k = 0; k < 15; ++k) twins.nudge(k * 20 + 1, 0.3f);
     EXPECT_FALSE(twins.commit(moving));
     for (std::size_t i = 0; i < std::size(rays); ++i)
         EXPECT_EQ(closest_hit(outer, rays[i]), before[i]);
