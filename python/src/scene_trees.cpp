@@ -331,7 +331,7 @@ auto BasicSceneTrees<Names>::placed_scenes() const -> std::vector<Below> {
     std::set<const BasicSceneTrees*> known;
     for (const auto& [id, geometry] : geometries_)
         if (geometry.scene != nullptr && known.insert(geometry.scene.get()).second)
-            below.push_back({geometry.scene, nullptr});
+            below.push_back({geometry.scene.get(), nullptr});
     return below;
 }
 

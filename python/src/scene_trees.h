@@ -290,7 +290,7 @@ private:
     };
     /// A scene that this one places, once for all its instances, and what it kept at the commit.
     struct Below {
-        std::shared_ptr<BasicSceneTrees> scene;
+        BasicSceneTrees* scene;  // held by geometries_ as long as members_changed_ is false
         std::shared_ptr<const Kept> kept;
     };
     struct Geometry {

@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include "base/float_env.h"
 #include "base/options.h"
+#include "engine/commit.h"
 #include "engine/part_tree.h"
 #include "engine/settled.h"
 #include "exec/progress.h"
@@ -24,30 +26,25 @@ class Moves {
 public:
     Moves(State& state, SceneTree& tree) : state_(state), tree_(tree) {}
 
-    /// Where the instances are to go. False if the tree must be made anew for that.
-    [[nodiscard]] bool plan() {
+    /// Where the instances are to go; the tree is as before. False if it must be made anew.
+    [[nodiscard]] bool plan(double refit_limit) {
+        // What was built anew may have to be built again, for which the links would be too much.
+        if (state_.moved.size() > tree_.instances.size() / one_in || !tree_.near.was_refitted)
+            return false;
+        // One part each: then instances and placed scenes are in the same order.
+        if (tree_.placed.size() != tree_.instances.size()) return false;
         std::vector<std::uint32_t> ids = state_.moved;
         std::ranges::sort(ids);
         ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
-        // What was built anew may have to be built again, for which the links would be too much.
-        if (ids.size() > tree_.instances.size() / one_in || !tree_.near.was_refitted) return false;
-        // One part each: then instances and placed scenes are in the same order.
-        if (tree_.placed.size() != tree_.instances.size()) return false;
         for (const std::uint32_t id : ids)
-            if (!plan(id)) return false;
-        return true;
+            if (!plan_one(id)) return false;
+        in_tree_.emplace(parts_, tree_.extents, tree_.near);
+        later_ = std::make_unique<SceneTree::Later>();
+        return in_tree_->plan(refit_limit);
     }
 
-    /// False, and all is as before, if the tree must be made anew. Throws what options.progress
-    /// throws, and then all is as before too.
-    [[nodiscard]] bool apply(const SceneOptions& options) {
-        PartMoves parts(parts_, tree_.extents, tree_.near);
-        auto later = std::make_unique<SceneTree::Later>();
-        if (!parts.plan(options.refit_limit)) return false;
-        ProgressListener listener(options.progress);
-        listener.reach(0);
-        listener.finish();
-        parts.apply();
+    void apply() noexcept {
+        in_tree_->apply();
         unite_extents();
         for (const Move& move : moves_) {
             InstanceName& name = tree_.instances[move.instance];
@@ -56,8 +53,7 @@ public:
             tree_.placed[move.instance].way = WayIn(move.geometry->inverse, name.mask);
             tree_.images[move.instance] = move.image;
         }
-        tree_.later = std::move(later);
-        return true;
+        tree_.later = std::move(later_);
     }
 
 private:
@@ -67,7 +63,7 @@ private:
         Image image;
     };
 
-    [[nodiscard]] bool plan(std::uint32_t id) {
+    [[nodiscard]] bool plan_one(std::uint32_t id) {
         const auto name = std::ranges::lower_bound(tree_.instances, id, {}, &InstanceName::id);
         const auto i = static_cast<std::size_t>(name - tree_.instances.begin());
         const SceneTree& scene = *tree_.placed[i].scene;
@@ -120,19 +116,41 @@ private:
     SceneTree& tree_;
     std::vector<Move> moves_;
     std::vector<MovedPart> parts_;
+    std::optional<PartMoves> in_tree_;
+    std::unique_ptr<SceneTree::Later> later_;
 };
+
+/// Whether nobody else holds the tree.
+bool holds_alone(const State& state) {
+    if (state.tree.use_count() != 1) return false;
+    // Whoever held it last may have let it go on another thread: what happened there is before what
+    // follows here, as the count is changed here too.
+    std::shared_ptr<const SceneTree>(state.tree).reset();
+    return true;
+}
 
 }  // namespace
 
 bool take_moves(State& state, const SceneOptions& options, CommitReport& report) {
     check_threads(options.threads);
     if (!state.only_moved || options.usage != Usage::moving || options.refit_limit < 1 ||
-        state.tree.use_count() != 1 || !is_settled_below(state, options))
+        !is_settled_below(state, options) || !holds_alone(state))
         return false;
     const FloatEnvironment plain;
     auto& tree = const_cast<SceneTree&>(*state.tree);  // no constant object, and nobody else's
     Moves moves(state, tree);
-    if (!moves.plan() || !moves.apply(options)) return false;
+    if (!moves.plan(options.refit_limit)) return false;
+    ProgressListener listener(options.progress);
+    listener.reach(0);
+    listener.finish();
+    if (!holds_alone(state)) {  // the listener had another scene take it
+        SceneOptions told = options;
+        told.progress = nullptr;
+        auto anew = make_scene_tree(state, told, report);
+        state.take(std::move(anew), report, options.refit_limit);
+        return true;
+    }
+    moves.apply();
     report = report_of_no_change(*state.report);
     report.parts_refitted = !tree.near.empty() || !tree.wild.empty();
     state.report = report;

@@ -67,10 +67,13 @@ double area_of(std::span<const BvhNode> slots) {
 
 void set_view(PartTree& out) { out.view = view_of(out.arrays); }
 
-/// `error`: the largest of all parts.
+/// `error`: the largest of all parts. Planes about another point than the middle of the bounds are
+/// farther from it, which rounds more (docs/algorithms/scenes.md).
 void set_growth(double error, PartTree& out) {
     out.growth.rate = std::nextafterf(static_cast<float>(error + float_rounding), infinity);
-    out.growth.least = static_cast<float>(float_rounding * largest_coordinate(out.arrays.bounds));
+    const Vec3 off = out.arrays.middle - center_of(out.arrays.bounds);
+    out.growth.least = static_cast<float>(float_rounding * (largest_coordinate(out.arrays.bounds) +
+                                                            2 * largest_coordinate({off, off})));
 }
 
 Extent extent_of_all(std::span<const std::uint32_t> parts, std::span<const Extent> extents) {

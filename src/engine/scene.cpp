@@ -296,7 +296,7 @@ template <class Scalar>
 void BasicScene<Scalar>::State::note_move(std::uint32_t id) noexcept {
     if (!changed) only_moved = true;
     changed = true;
-    if (!only_moved) return;
+    if (!only_moved || (!moved.empty() && moved.back() == id)) return;
     try {
         if (moved.size() >= geometries.size()) return note_change();
         moved.push_back(id);

@@ -85,7 +85,8 @@ struct BasicScene<Scalar>::State {
     std::uint64_t next_id = 0;      // all below were given once
     std::set<std::uint32_t> taken;  // those above, chosen by the caller
     bool changed = true;            // anything, since the last commit
-    /// If no more than transforms and masks of instances changed: of which. Some may be twice.
+    /// If no more than transforms and masks of instances changed: of which. Some may stand there
+    /// twice.
     bool only_moved = false;
     std::vector<std::uint32_t> moved;
     std::shared_ptr<const typename SceneKind<Scalar>::Tree> tree;  // null before the first commit
