@@ -77,6 +77,11 @@ class Al09(unittest.TestCase):
         for documents in (parts, parts[::-1]):
             made_up = plots.Results([{"simulate": rows, "claims": [], "published": []} for rows in documents])
             self.assertEqual(made_up.on_same_launches("s", "m", "ao")["fast"][:2], ("l1", 50))
+        # Where both traced all, l1 is half of their bounds there, with the error of its sample.
+        whole = {"simulate": [row("fast", 1, 120) | {"sampling_error": 0}, row("slow", 1, 100) | {"sampling_error": 0}], "claims": [], "published": []}
+        found = plots.Results([{"simulate": parts[0], "claims": [], "published": []}, whole]).on_same_launches("s", "m", "ao")
+        self.assertEqual(found["fast"][:2], ("l1", 60))
+        self.assertAlmostEqual(found["fast"][2]["sampling_error"], 0.075)
 
     def test_what_is_not_told_from_the_first_kernel(self):
         costs = [{"kernel": kernel, "operation": "turn", "most": most} for kernel, most in (("first", 11), ("persistent_first", 12), ("twin", 11))]
