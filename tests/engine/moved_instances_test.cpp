@@ -111,6 +111,14 @@ struct Twins {
     }
     bool known = false;
 
+    /// What was built has been refitted since, and one instance moved again.
+    void be_refitted() {
+        for (int k = 0; k < 3; ++k) {
+            commit(moving);
+            nudge(3, 0.1f);
+        }
+    }
+
     /// The trees, and what rays and queries find.
     void compare() {
         const SceneTree &a = *SceneInternals::tree(in_place), &b = *SceneInternals::tree(anew);
@@ -287,10 +295,7 @@ TEST(MovedInstances, LeaveOtherScenesWhatTheyTook) {
 
 TEST(MovedInstances, TellListenersWhoMayEndTheCommit) {
     Twins twins(5);
-    for (int k = 0; k < 3; ++k) {
-        twins.commit(moving);
-        twins.nudge(3, 0.1f);
-    }
+    twins.be_refitted();
     SceneOptions heard = moving;
     std::vector<double> parts;
     heard.progress = [&](double part) { parts.push_back(part); };
@@ -319,10 +324,7 @@ TEST(MovedInstances, TellListenersWhoMayEndTheCommit) {
 
 TEST(MovedInstances, AListenerMayHaveAnotherSceneTakeTheTree) {
     Twins twins(6);
-    for (int k = 0; k < 3; ++k) {
-        twins.commit(moving);
-        twins.nudge(3, 0.1f);
-    }
+    twins.be_refitted();
     Scene outer;
     SceneOptions heard = moving;
     heard.progress = [&](double part) {
@@ -346,10 +348,7 @@ TEST(MovedInstances, AListenerMayHaveAnotherSceneTakeTheTree) {
 
 TEST(MovedInstances, ThatAreRefusedLeaveTheLastCommit) {
     Twins twins(4);
-    for (int k = 0; k < 3; ++k) {
-        twins.commit(moving);
-        twins.nudge(3, 0.1f);
-    }
+    twins.be_refitted();
     SceneOptions wrong = moving;
     wrong.threads = 5000;
     EXPECT_THROW(twins.in_place.commit(wrong), InputError);
