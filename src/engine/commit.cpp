@@ -28,11 +28,11 @@ struct WideMaker {
     /// few triangles it is little, and there may be many such meshes: threads keep it.
     void build(const MeshView& mesh, const SceneOptions& options, const MeshTree* last,
                MeshTree& out) {
-        if (last != nullptr) out.memory = last->memory;
+        out.memory = last != nullptr && last->memory ? *last->memory : Recycler<WideBvh>();
         std::unique_ptr<WideBvh> built = build_by_quality(
             options.quality, options.threads, mesh.triangles.size(),
             [&](const BuildOptions& build) {
-                std::unique_ptr<WideBvh> tree = taken_or_new(out.memory);
+                std::unique_ptr<WideBvh> tree = taken_or_new(*out.memory);
                 if (mesh.triangles.size() <= few_triangles) {
                     const ThreadOwn<WideBvhBuilder> builder;
                     builder->build(mesh, build, *tree, {.compact = options.compact});
@@ -46,7 +46,7 @@ struct WideMaker {
             [](const auto& tree) { return tree->stats().sah; });
         out.sah_at_build = built->stats().sah;
         out.refitter = nullptr;  // a refit that was tried had other links
-        finish(out.memory.share(std::move(built)), out);
+        finish(out.memory->share(std::move(built)), out);
     }
     static std::uint64_t left_out(const MeshTree& made) { return made.tree->stats().left_out; }
     static void share_rates(const MeshTree& old, MeshTree& out) {

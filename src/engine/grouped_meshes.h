@@ -2,18 +2,23 @@
 #pragma once
 
 #include <algorithm>
+#include <boost/container/small_vector.hpp>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
 namespace raydix {
 
+/// A number a mesh. Most groups are one mesh, and there may be many of them: its number takes no
+/// memory of its own.
+using NumberAMesh = boost::container::small_vector<std::uint32_t, 1>;
+
 /// One mesh or several, which follow each other by id.
 struct GroupedMeshes {
-    std::vector<std::uint32_t> ids;  // [meshes] ascending
-    std::vector<std::uint32_t>
-        first;  // [meshes]: the first triangle of each in the tree's counting
-    // bucket[i]: the mesh of triangle i << shift; one more, the last mesh, behind them.
+    NumberAMesh ids;    // [meshes] ascending
+    NumberAMesh first;  // [meshes]: the first triangle of each in the tree's counting
+    // bucket[i]: the mesh of triangle i << shift; one more, the last mesh, behind them. Of several
+    // meshes.
     std::vector<std::uint32_t> bucket;
     std::uint32_t shift = 0;
     std::uint32_t mask = 0;  // of all of them
@@ -23,6 +28,7 @@ struct GroupedMeshes {
 
     /// When `first` and `triangles` are known: about two buckets a mesh.
     void make_buckets() {
+        if (first.size() == 1) return;
         while ((triangles >> shift) > 2 * first.size()) ++shift;
         bucket.clear();
         for (std::uint64_t prim = 0; prim < triangles; prim += std::uint64_t{1} << shift)
@@ -33,6 +39,7 @@ struct GroupedMeshes {
 
     /// Triangle `prim` of the tree: the mesh that it belongs to, by its place.
     [[nodiscard]] std::size_t mesh_of(std::uint32_t prim) const {
+        if (first.size() == 1) return 0;
         const std::uint32_t b = prim >> shift;
         std::size_t m = bucket[b];
         const std::size_t last = bucket[b + 1];
@@ -47,7 +54,7 @@ struct GroupedMeshes {
     /// Gives a hit of the tree its mesh.
     template <class AnyHit>
     void name(AnyHit& hit) const {
-        const std::size_t m = first.size() == 1 ? 0 : mesh_of(hit.prim);
+        const std::size_t m = mesh_of(hit.prim);
         hit.geometry = ids[m];
         hit.prim -= first[m];
     }

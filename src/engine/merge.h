@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/grouped_meshes.h"
 #include "exec/join_copies.h"
 
 namespace raydix {
@@ -36,7 +37,7 @@ inline void require_countable(std::uint64_t triangles, std::uint64_t vertices) {
 /// In float or in double. `first`: takes the first triangle of each. Throws InputError as
 /// require_countable() does.
 template <class AnyMesh, class AnyView>
-[[nodiscard]] AnyMesh merged(std::span<const AnyView> meshes, std::vector<std::uint32_t>& first) {
+[[nodiscard]] AnyMesh merged(std::span<const AnyView> meshes, NumberAMesh& first) {
     std::vector<MergedCopy<AnyView>> copies;
     std::size_t vertices = 0, triangles = 0;
     for (const AnyView& mesh : meshes) {

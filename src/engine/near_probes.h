@@ -217,7 +217,7 @@ private:
 struct TriangleName {
     std::uint32_t geometry, prim;
     TriangleName(const MeshTree& mesh, std::uint32_t triangle) {
-        const std::size_t m = mesh.first.size() == 1 ? 0 : mesh.mesh_of(triangle);
+        const std::size_t m = mesh.mesh_of(triangle);
         geometry = mesh.ids[m];
         prim = triangle - mesh.first[m];
     }

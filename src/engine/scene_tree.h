@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -43,7 +44,8 @@ struct MeshTree : GroupedMeshes {
     std::size_t stack_size = 0;              // of the deepest path; 0: no ray hits anything
     std::shared_ptr<WideRefitter> refitter;  // null before the first refit
     std::shared_ptr<KeptFlatTriangles> flats = std::make_shared<KeptFlatTriangles>();
-    Recycler<WideBvh> memory;  // of trees that were built for the same meshes
+    /// Of trees that were built for the same meshes; none where this one was refitted.
+    std::optional<Recycler<WideBvh>> memory;
 
     void set_tree(std::shared_ptr<const WideBvh> to) {
         tree = std::move(to);

@@ -43,7 +43,7 @@ public:
             if (is_shared(name)) require_indices(*name);
         std::vector<State> states(mesh_.triangles, State::in_no_leaf);
         for_each_triangle(mesh_, [&](std::uint32_t prim, const Corners& then) {
-            const std::size_t m = names_.size() == 1 ? 0 : mesh_.mesh_of(prim);
+            const std::size_t m = mesh_.mesh_of(prim);
             if (!is_shared(names_[m])) return;
             const Corners now = source_of(*names_[m]).corners(prim - mesh_.first[m]);
             states[prim] = are_equal(then, now) ? State::same : State::other;

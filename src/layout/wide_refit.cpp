@@ -172,7 +172,11 @@ public:
           mesh_(mesh),
           source_{mesh.vertices.data(), mesh.triangles.data(), mesh.vertices.size()},
           out_(out),
-          areas_(with.runs() + 1) {}
+          more_areas_(with.runs() < few_areas_.size() ? 0 : with.runs() + 1),
+          areas_(more_areas_.empty() ? std::span(few_areas_).first(with.runs() + 1)
+                                     : std::span(more_areas_)) {}
+    WideRefit(const WideRefit&) = delete;
+    WideRefit& operator=(const WideRefit&) = delete;
 
     /// False where the tree cannot be kept.
     bool run() {
@@ -347,7 +351,10 @@ private:
     const TriangleSource source_;
     WideBvh::Arrays& out_;
     const FitNode fit_node_ = best_fit_node();
-    std::vector<Areas> areas_;  // [runs + 1], the last one of the nodes above
+    // There may be many small trees: these take no memory of their own.
+    std::array<Areas, 2> few_areas_;
+    std::vector<Areas> more_areas_;
+    const std::span<Areas> areas_;  // [runs + 1], the last one of the nodes above
     Aabb root_ = empty_box(), others_ = empty_box();
     std::uint64_t left_out_ = 0;
     bool checks_range_ = false;
