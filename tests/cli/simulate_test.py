@@ -258,10 +258,15 @@ class Simulate(ProgramTest):
 
 
 class Traversal(ProgramTest):
+    def tables_and_document(self, *arguments):
+        """What one run prints, and what it writes."""
+        out = self.succeed(*arguments, "--json", "traversal.json").out
+        return out, json.loads((self.folder / "traversal.json").read_text(encoding="utf-8"))
+
     def test_tables(self):
         size = ("--size", "16x12", "--samples", "2") if SANITIZED else SMALL
         arguments = ("bench", "traversal", SCENE, *size, "--machine", "gtx285,gtx480")
-        document = self.document(*arguments)
+        out, document = self.tables_and_document(*arguments)
         rows = document["simulate"]
         self.assertEqual({r["machine"] for r in rows}, {"gtx285", "gtx480", "gtx285_enum_popc"})
         self.assertEqual(len(rows), 4 * (2 * 11 + 2))
@@ -279,7 +284,6 @@ class Traversal(ProgramTest):
         for row in sweep:
             if row["width"] == 1 and row["kernel"] in ("while_while", "if_if"):
                 self.assertAlmostEqual(row["simd_efficiency"], 1)
-        out = self.succeed(*arguments, "--sweep-sample", "0").out
         for word in ("simulated Mrays/s", "claims", "no GPU was used"):
             self.assertIn(word, out)
 
@@ -352,7 +356,7 @@ class Traversal(ProgramTest):
         size = "40x30" if SANITIZED else "64x48"
         arguments = ("bench", "traversal", SCENE, "--size", size, "--samples", "4", "--machine", ",".join(small), "--rays", "primary,ao",
                      "--memory", "--sweep-sample", "0")  # machines that these launches fill
-        document = self.document(*arguments)
+        out, document = self.tables_and_document(*arguments)
         rows = {(r["rays"], r["kernel"], r["machine"]): r for r in document["simulate"]}
         most = {(m["name"], c.get("kernel"), c["operation"]): c.get("most", 0) for m in document["machines"] for c in m["costs"]}
 
@@ -403,7 +407,7 @@ class Traversal(ProgramTest):
                 self.assertAlmostEqual(kernel["low"], rates[0] / rate * ends[0], 5)
                 self.assertAlmostEqual(kernel["high"], rates[0] / rate * ends[1], 5)
         self.assertGreater(level, 0)
-        self.assertIn("not told from: ", self.succeed(*arguments).out)
+        self.assertIn("not told from: ", out)
         # Of a part of the launches the error of the sample comes to that.
         size = ("--size", "96x72", "--launch-rays", "2048") if SANITIZED else ("--size", "256x192", "--launch-rays", "8192")
         part = self.document("bench", "traversal", SCENE, *size, "--samples", "4", "--sample", "0.3", "--machine", small[1], "--rays", "ao", "--sweep-sample", "0")
