@@ -9,6 +9,7 @@
 #include "base/float_env.h"
 #include "base/options.h"
 #include "engine/commit.h"
+#include "engine/near_scene.h"
 #include "engine/part_tree.h"
 #include "engine/settled.h"
 #include "exec/progress.h"
@@ -40,6 +41,8 @@ public:
             if (!plan_one(id)) return false;
         in_tree_.emplace(parts_, tree_.extents, tree_.near);
         later_ = std::make_unique<SceneTree::Later>();
+        if (near_may_stay())
+            std::call_once(later_->near_asked, [&] { later_->near = tree_.later->near; });
         return in_tree_->plan(refit_limit);
     }
 
@@ -53,6 +56,7 @@ public:
             tree_.placed[move.instance].way = WayIn(move.geometry->inverse, name.mask);
             tree_.images[move.instance] = move.image;
         }
+        if (later_->near != nullptr) move_near(const_cast<NearScene&>(*later_->near));
         tree_.later = std::move(later_);
     }
 
@@ -78,6 +82,35 @@ private:
         const Extent& extent = parts_.back().extent;
         return in_range(extent.box.lo) && in_range(extent.box.hi) && !is_wild(extent) &&
                !is_wild(tree_.extents[part]);
+    }
+
+    /// Whether what queries of distance made of the scene needs no more than other ways out of what
+    /// moves: no triangle without area is in it, and its largest coordinate is that of another
+    /// part.
+    [[nodiscard]] bool near_may_stay() const {
+        const NearScene* const near = tree_.later->near.get();
+        return near != nullptr && !near->has_flats() &&
+               std::ranges::all_of(moves_,
+                                   [&](const Move& move) {
+                                       return near->ways[move.instance].size < near->reach;
+                                   }) &&
+               std::ranges::all_of(parts_, [&](const MovedPart& moved) {
+                   return largest_coordinate(tree_.extents[moved.part].box) < near->reach;
+               });
+    }
+    /// The tree is as it will be.
+    void move_near(NearScene& near) noexcept {
+        if (!tree_.extent.empty())
+            near.reach = std::max(near.reach, largest_coordinate(tree_.extent.box));
+        for (const Move& move : moves_) {
+            NearWay& way = near.ways[move.instance];
+            const Affine map = affine_of(move.geometry->transform);
+            const double reach = near_scene_of(*tree_.placed[move.instance].scene).reach;
+            way = placed_by(map, way_within(reach, way.first, way.count));
+            near.maps[way.first] = map;
+            near.reach = std::max(near.reach, way.size);
+        }
+        near.has_answers = 0;
     }
 
     /// parts_ has where they were.

@@ -144,16 +144,11 @@ private:
             const NearScene& inner = near_scene_of(*placed.scene);
             const std::uint32_t levels = follow_path(scene_, placed.number, way);
             NearWay& near = out_.ways[k];
-            near.first = static_cast<std::uint32_t>(out_.maps.size());
-            near.count = levels;
-            near.map = near.inverse = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {}};
-            near.size = inner.reach;
+            near = way_within(inner.reach, static_cast<std::uint32_t>(out_.maps.size()), levels);
             for (std::uint32_t level = levels; level-- > 0;) {
                 const Affine map = affine_of(way[level]->transform);
                 out_.maps.push_back(map);
-                const bool turned = mirrors(map.x, map.y, map.z);
-                near =
-                    compose({map, *inverse_of(map), {}, 0, near.first, near.count, turned}, near);
+                near = placed_by(map, near);
             }
             out_.reach = std::max(out_.reach, near.size);
             if (inner.has_flats())
@@ -234,6 +229,16 @@ NearWay compose(const NearWay& outer, const NearWay& inner) {
                 outer.mirrors != inner.mirrors};
     set_weights(out);
     return out;
+}
+
+NearWay placed_by(const Affine& map, const NearWay& inner) {
+    const bool turned = mirrors(map.x, map.y, map.z);
+    return compose({map, *inverse_of(map), {}, 0, inner.first, inner.count, turned}, inner);
+}
+
+NearWay way_within(double reach, std::uint32_t first, std::uint32_t count) {
+    const Affine none{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {}};
+    return {none, none, {}, reach, first, count};
 }
 
 const NearScene& near_scene_of(const SceneTree& scene) {

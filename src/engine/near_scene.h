@@ -1,6 +1,6 @@
 // What queries of distance and overlap need of a scene besides what rays do: the triangles without
 // area, in a tree that rays never enter, and the maps of placed scenes from their space outward.
-// Made when the first such query comes, and never changed.
+// Made when the first such query comes, and changed as SceneTree is (moved_instances.h).
 #pragma once
 
 #include <raydix/buffer.h>
@@ -40,6 +40,11 @@ void set_weights(NearWay& way);
 
 /// One map farther out.
 [[nodiscard]] NearWay compose(const NearWay& outer, const NearWay& inner);
+
+/// Of what is placed by one instance more, whose map is `map`.
+[[nodiscard]] NearWay placed_by(const Affine& map, const NearWay& inner);
+/// Before the first: of a scene with coordinates up to `reach`.
+[[nodiscard]] NearWay way_within(double reach, std::uint32_t first, std::uint32_t count);
 
 struct NearScene {
     std::vector<NearWay> ways;  // [placed scenes]

@@ -16,6 +16,7 @@
 #include <utility>
 #include <vector>
 
+#include "engine/near_scene.h"
 #include "support/message.h"
 #include "support/random.h"
 #include "support/support.h"
@@ -96,6 +97,7 @@ struct Twins {
     /// Whether the first scene changed its tree.
     bool commit(const SceneOptions& options) {
         const SceneTree* const before = known ? SceneInternals::tree(in_place).get() : nullptr;
+        const NearScene* const near_before = known ? before->later->near.get() : nullptr;
         // Who else holds a tree keeps it from being changed.
         const auto held = known ? SceneInternals::tree(anew) : nullptr;
         const CommitReport a = in_place.commit(options), b = anew.commit(options);
@@ -107,9 +109,12 @@ struct Twins {
                   std::tuple(b.trees_built, b.trees_refitted, b.sah_ratio, b.bytes, b.paths));
         EXPECT_TRUE(in_place.committed());
         known = true;
-        return SceneInternals::tree(in_place).get() == before;
+        const SceneTree* const tree = SceneInternals::tree(in_place).get();
+        near_stays += tree->later->near != nullptr && tree->later->near.get() == near_before;
+        return tree == before;
     }
     bool known = false;
+    int near_stays = 0;  // so often what queries of distance know of the scene was changed in place
 
     /// What was built has been refitted since, and one instance moved again.
     void be_refitted() {
@@ -189,6 +194,7 @@ TEST(MovedInstances, AreThoseOfACommitOfEverything) {
             step(moving);
         }
         EXPECT_GT(in_place, 15);
+        EXPECT_GT(twins.near_stays, 8);
         in_place = steps = 0;
         for (int k = 0; k < 10; ++k) {  // out of the bounds, and in again
             const std::uint32_t which = twins.any();
@@ -212,6 +218,58 @@ TEST(MovedInstances, AreThoseOfACommitOfEverything) {
             step(moving);
         }
     }
+}
+
+/// Beside triangles that have no area, which only queries of distance find.
+TEST(MovedInstances, ThatHoldTrianglesWithoutAreaAreFoundWhereTheyAre) {
+    Random random(3);
+    Scene needle, in_place, anew;
+    needle.add(Mesh{"", {{0, 0, 0}, {1, 0, 0}, {0.5f, 0, 0}}, {{0, 1, 2}}});
+    needle.commit();
+    std::vector<Transform> places(100);
+    for (Transform& place : places) {
+        for (int a = 0; a < 3; ++a) place.m[a][3] = random.between(0, 20);
+        in_place.add(needle, place);
+        anew.add(needle, place);
+    }
+    std::vector<Vec3> points;
+    for (int k = 0; k < 50; ++k) points.push_back(random.in(-1, 21));
+    for (int k = 0; k < 8; ++k) {
+        const auto which = static_cast<std::uint32_t>(random.between(0, 99.5f));
+        places[which].m[0][3] += 1;
+        in_place.set_transform(which, places[which]);
+        anew.set_transform(which, places[which]);
+        in_place.commit(moving);
+        anew.commit();
+        for (const Vec3 point : points)
+            EXPECT_EQ(closest_point(in_place, point).distance, closest_point(anew, point).distance);
+    }
+}
+
+TEST(MovedInstances, WhoseMasksBringInWhatHasNoAnswerAreRefused) {
+    Scene pyramids, boxes, scene;
+    pyramids.add(pyramid());
+    const Aabb box{{0, 0, 0}, {1, 1, 1}};
+    boxes.add(
+        UserGeometry(std::span(&box, 1), [](std::uint32_t, const Ray&, Hit&) { return false; }));
+    pyramids.commit(), boxes.commit();
+    for (int k = 0; k < 40; ++k) {
+        Transform place;
+        place.m[0][3] = static_cast<float>(3 * k);
+        scene.add(k == 20 ? boxes : pyramids, place, {.mask = k == 20 ? 2u : 1u});
+    }
+    const auto commit = [&](std::uint32_t id) {
+        Transform place;
+        place.m[0][3] = static_cast<float>(3 * id), place.m[1][3] = 0.5f;
+        scene.set_transform(id, place);
+        scene.commit(moving);
+    };
+    scene.commit(moving);
+    commit(5), commit(6), commit(5);
+    EXPECT_TRUE(closest_point(scene, {0, 0, 9}, infinity, 1).found());
+    scene.set_mask(20, 3);
+    commit(6);
+    EXPECT_THROW((void)closest_point(scene, {0, 0, 9}, infinity, 1), InputError);
 }
 
 TEST(MovedInstances, WithOtherChangesOrOptionsTakeACommitOfEverything) {
