@@ -597,6 +597,10 @@ FAULTS = [
           "moved instances: scenes that hold the tree see them move", "engine"),
     Fault("src/engine/moved_instances.cpp", "name.mask = move.geometry->mask;", "",
           "moved instances: masks stay", "engine"),
+    Fault("src/engine/scene_ray.h", "? min_of(reach, std::nextafterf(found.t, infinity))", "? std::nextafterf(found.t, infinity)",
+          "instances: hits behind the end of a long ray that has another one there", "engine"),
+    Fault("src/engine/scene_ray_double.h", "? std::min(reach_, std::nextafter(hit.t, 1.0))", "? std::nextafter(hit.t, 1.0)",
+          "instances in double: hits behind the end of a long ray that has another one there", "engine"),
     Fault("src/engine/extent.h", "return at(all.box.lo, one.box.lo) || at(all.box.hi, one.box.hi) ||", "return",
           "moved instances: bounds never shrink", "engine"),
 ]

@@ -49,9 +49,10 @@ HWY_INLINE bool keep(const Tree& tree, std::uint32_t number, double scale, const
     if (best.hit() && !(order_of(found) < order_of(best))) return false;
     best = found;
     // What differs in the line may be equal in the caller's units where those are subnormal: it
-    // must be found too.
-    reach =
-        found.t < std::numeric_limits<float>::min() ? std::nextafterf(found.t, infinity) : found.t;
+    // must be found too, up to the end that the caller gave.
+    reach = found.t < std::numeric_limits<float>::min()
+                ? min_of(reach, std::nextafterf(found.t, infinity))
+                : found.t;
     return true;
 }
 

@@ -9,6 +9,7 @@
 
 #include <hwy/highway.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <type_traits>
@@ -258,8 +259,10 @@ protected:
         if (best_.hit() && !(order_of(hit) < order_of(best_))) return;
         best_ = hit;
         // What differs on the way in may be equal in the caller's units where those are subnormal:
-        // it must be found too.
-        reach_ = hit.t < std::numeric_limits<double>::min() ? std::nextafter(hit.t, 1.0) : hit.t;
+        // it must be found too, up to the end that the caller gave.
+        reach_ = hit.t < std::numeric_limits<double>::min()
+                     ? std::min(reach_, std::nextafter(hit.t, 1.0))
+                     : hit.t;
     }
 
     const std::uint32_t mask_;

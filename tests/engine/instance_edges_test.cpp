@@ -12,6 +12,7 @@
 #include <iostream>
 #include <limits>
 #include <optional>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -462,6 +463,28 @@ TEST(InstanceEdges, TiesOfLongDirections) {
 }
 
 /// Rays that start on a triangle, from both sides and in instances that are turned over.
+/// A triangle a little behind the end of a long ray has the t of the end in the caller's units.
+TEST(InstanceEdges, TiesOfLongDirectionsEndWithTheRay) {
+    const auto check = [](auto& scene, const auto& mesh, auto ray, auto little) {
+        using Scene = std::remove_reference_t<decltype(scene)>;
+        using Map = std::conditional_t<std::is_same_v<Scene, raydix::Scene>, Transform, TransformD>;
+        Map behind;
+        behind.m[2][3] = little;
+        scene.add(Scene(mesh), behind);
+        scene.add(Scene(mesh), Map{});
+        scene.commit();
+        ray.tmin = ray.tmax = 0;
+        EXPECT_EQ(closest_hit(scene, ray).instance, 2u);
+        for (const auto& hit : trace(scene, std::vector(100, ray))) EXPECT_EQ(hit.instance, 2u);
+    };
+    Scene floats;
+    const Mesh mesh{"", {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}};
+    check(floats, mesh, Ray{{0.25f, 0.25f, 0}, 0, {0, 0, 0x1p122f}}, 0x1p-52f);
+    SceneD doubles;
+    const MeshD wide{"", {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}};
+    check(doubles, wide, RayD{{0.25, 0.25, 0}, 0, {0, 0, 0x1p1000}}, 0x1p-200);
+}
+
 TEST(InstanceEdges, NoTIsMinusZero) {
     const Scene triangle(Mesh{"", {{-1, -1, 0}, {1, -1, 0}, {0, 1, 0}}, {{0, 1, 2}}});
     std::size_t hits = 0;
