@@ -224,7 +224,9 @@ TEST(MovedInstances, AreThoseOfACommitOfEverything) {
 TEST(MovedInstances, ThatHoldTrianglesWithoutAreaAreFoundWhereTheyAre) {
     Random random(3);
     Scene needle, in_place, anew;
-    needle.add(Mesh{"", {{0, 0, 0}, {1, 0, 0}, {0.5f, 0, 0}}, {{0, 1, 2}}});
+    needle.add(Mesh{"",
+                    {{0, 0, 0}, {1, 0, 0}, {0.5f, 0, 0}, {0, 0.1f, 0}, {0, 0, 0.1f}},
+                    {{0, 1, 2}, {0, 3, 4}}});
     needle.commit();
     std::vector<Transform> places(100);
     for (Transform& place : places) {
@@ -234,6 +236,8 @@ TEST(MovedInstances, ThatHoldTrianglesWithoutAreaAreFoundWhereTheyAre) {
     }
     std::vector<Vec3> points;
     for (int k = 0; k < 50; ++k) points.push_back(random.in(-1, 21));
+    const SceneTree* tree = nullptr;
+    int same_tree = 0;
     for (int k = 0; k < 8; ++k) {
         const auto which = static_cast<std::uint32_t>(random.between(0, 99.5f));
         places[which].m[0][3] += 1;
@@ -241,9 +245,12 @@ TEST(MovedInstances, ThatHoldTrianglesWithoutAreaAreFoundWhereTheyAre) {
         anew.set_transform(which, places[which]);
         in_place.commit(moving);
         anew.commit();
+        same_tree += tree == SceneInternals::tree(in_place).get();
+        tree = SceneInternals::tree(in_place).get();
         for (const Vec3 point : points)
             EXPECT_EQ(closest_point(in_place, point).distance, closest_point(anew, point).distance);
     }
+    EXPECT_GT(same_tree, 4);
 }
 
 TEST(MovedInstances, WhoseMasksBringInWhatHasNoAnswerAreRefused) {
