@@ -103,8 +103,14 @@ Json query_json(const QueryFigures& figures, const QueryCommand& options) {
     const auto named = [](const std::string& file) {
         return file.empty() ? Json(nullptr) : Json(file);
     };
+    const auto distance = [](const auto& given) {
+        return given ? Json(static_cast<float>(*given)) : Json(nullptr);
+    };
     return {
         {"kind", figures.kind},
+        {"k", options.k ? Json(*options.k) : Json(nullptr)},
+        {"max_distance", distance(options.max_distance)},
+        {"radius", distance(options.radius)},
         {"queries_file", named(options.queries_file)},
         {"with", named(options.with_scene)},
         {"narrow", options.narrow},

@@ -151,10 +151,7 @@ void run_point_query(const QueryCommand& options) {
     document["scene"]["left_out"] = index.left_out();
     document["load_ms"] = scene.load_ms;
     document["build"] = index_json(index, options.common.threads);
-    Json query = query_json(answer(options, index, scene), options);
-    if (options.k) query["k"] = *options.k;
-    if (options.max_distance) query["max_distance"] = static_cast<float>(*options.max_distance);
-    if (options.radius) query["radius"] = static_cast<float>(*options.radius);
+    const Json query = query_json(answer(options, index, scene), options);
     document["query"] = Json::array({query});
     if (options.common.prints_tables()) {
         print_index(index);

@@ -210,8 +210,9 @@ public:
     [[nodiscard]] std::optional<Transform> transform(std::uint32_t id) const;
     /// Throws InputError if there is no such geometry.
     [[nodiscard]] std::uint32_t mask(std::uint32_t id) const;
-    /// A box around all triangles and shapes of the last commit; lo > hi if there are none. Around
-    /// turned instances it may be larger than needed. Throws InputError without a commit.
+    /// A box around what rays can hit in the last commit; triangles without area may lie outside,
+    /// but not in double. lo > hi: nothing. It may be larger than needed. InputError without a
+    /// commit.
     [[nodiscard]] Box bounds() const;
     /// The ids of the instances on path `number` of a hit, the outermost first, in the last commit.
     /// Empty for 0. Throws InputError without a commit, or if there is no such path.

@@ -496,7 +496,7 @@ class Scene(SceneContents, SceneQueries, SurfaceOfHits, SavedScene, SceneViews):
 
     def wide_stats(self) -> dict[str, Any]:
         """Figures of the wide tree that rays go through, built for this call as a commit builds
-        it."""
+        it. "sah" is None if the tree is empty or its root has no area."""
         return self._core.wide_stats()
 
     def closure(self) -> dict[str, Any]:

@@ -144,7 +144,7 @@ auto with_two(Scene& scene, Scene* other, const Call& call) {
     Scene* const last = other == nullptr ? &scene : other;
     Reading first_lock, second_lock;
     first_lock = std::min(&scene, last, std::less<>())->read();
-    if (last == &scene) return call(scene.is_mesh(), static_cast<Scene*>(nullptr));
+    if (last == &scene) return call(scene.is_mesh(), other);
     second_lock = std::max(&scene, last, std::less<>())->read();
     return call(scene.is_mesh() && other->is_mesh(), other);
 }

@@ -15,7 +15,7 @@ using nlohmann::json;
 namespace {
 
 constexpr std::uint64_t largest_file = std::uint64_t{16} << 20;
-constexpr std::uint64_t largest_side = 65536;  // pixels
+constexpr std::uint64_t largest_side = 16384;  // pixels, as of pictures
 
 class CameraReader {
 public:

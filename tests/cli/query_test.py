@@ -101,6 +101,7 @@ class Query(ProgramTest):
             short += len(wanted) < k
         self.assertGreater(short, 0)
         self.assertEqual(document["query"][0]["max_distance"], 0.25)
+        self.assertIsNone(document["query"][0]["radius"])
         self.fail_with_usage("query", self.cloud, "--radius", "1", "--max-distance", "1", names=["--max-distance"])
 
     def test_sort_belongs_to_lists(self):

@@ -180,6 +180,10 @@ def test_overlaps_and_touches(rng):
             assert len(a) > 10 and a.dtype == "u4"
             np.testing.assert_array_equal(a, b)
         assert here.count_overlaps(other, narrow=narrow) == len(here.overlaps(other, narrow=narrow))
+        # A scene beside itself is two of the same: nothing is left out.
+        again = double(vertices, faces)
+        assert here.count_overlaps(here, narrow=narrow) == here.count_overlaps(again, narrow=narrow)
+        np.testing.assert_array_equal(here.overlaps(here, narrow=narrow), here.overlaps(again, narrow=narrow))
     corners = vertices[faces]
     lo, hi = corners.min(axis=1), corners.max(axis=1)
     meet = ((lo[:, None] <= hi[None]) & (lo[None] <= hi[:, None])).all(axis=-1)

@@ -324,6 +324,8 @@ def test_options_are_checked_and_invalid_triangles_left_out():
         == scene.stats()["left_out"]
         == scene.wide_stats()["left_out"]
     )
+    assert scene.wide_stats()["sah"] > 0
+    assert raydix.Scene([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]]).wide_stats()["sah"] is None
     with pytest.raises(raydix.InputError):
         raydix.Scene(vertices, BOX[1], strict=True).stats()
     with pytest.raises(

@@ -73,7 +73,7 @@ TEST(Cameras, says_what_is_wrong) {
     EXPECT_EQ(error("[{]"), "cameras.json: JSON: not valid at byte 3");
     EXPECT_EQ(error("[1e999]"), "cameras.json: JSON: a number is out of range");
     EXPECT_EQ(error(R"({"width":0,"cameras":[]})"),
-              "cameras.json: picture: width is not from 1 to 65536");
+              "cameras.json: picture: width is not from 1 to 16384");
     EXPECT_EQ(error(R"({"ao_radius":-1,"cameras":[]})"),
               "cameras.json: ao_radius: not a number from 0 to 1e12");
 }
