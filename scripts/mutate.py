@@ -17,7 +17,25 @@ import subprocess
 import sys
 import time
 
-from planted_faults import FAULTS, LONG
+from planted_faults import FAULTS
+
+# Tests of a folder that take more than a second each, together minutes: only what the others let pass is put to them.
+LONG = {
+    "trace": ("Hits.BuiltinScenesLikeBruteForce", "Hits.SoupsLikeBruteForce", "Hits.LeafSizeAndCodeBitsChangeNoBit",
+              "Hits.SoupAgainstEveryTriangle", "Hits.FaultResultsDifferByThreadCount", "Simd.SoupsLikeScalar",
+              "Simd.BuiltinScenesLikeScalar", "Simd.EveryBuilderAndLeafSize", "Simd.LimitsBesideTheHit",
+              "Simd.NoRayLeavesAClosedSurface", "KdRays.SoupsLikeBruteForce", "KdRays.BuiltinScenesLikeBruteForce",
+              "KdRays.SharedBunnyLikeTheBvh", "KdNearest.LikeEveryPoint", "Watertight.*", "DoubleWatertight.*",
+              "CwbvhTrace.SoupsLikeScalar", "CwbvhTrace.BuiltinScenesLikeScalar", "OracleHits.BuiltinScenes*",
+              "DoubleTrace.EveryBuilderLikeEveryTriangle", "DoubleTrace.PartsOfTrianglesChangeNoBit",
+              "DoubleTrace.ThreadsLeavesAndCodesChangeNoBit", "DoubleTrace.TIsThatOfExactArithmetic",
+              "RayFaults.GpsCoordinatesCollapseCodes", "Simulate.FiguresDoNotDependOnThreads"),
+    "engine": ("*WorldsAnswerAsTheirTrianglesDo", "DoubleMesh.AtAnyPlaceHasTheHitsOfAllTriangles",
+               "DoubleMesh.OfAnyShapeHasTheHitsOfAllTriangles", "*ShearedInstancesLoseNoHits",
+               "*MixedScenesAnswerAsEachShapeDoes", "*MovedVerticesRefitATreeWhileItIsGood",
+               "*AnswersAreThoseOfEveryMeshOnEveryPath", "InstanceEdges.NearlyFlatMaps",
+               "SceneProgress.ACommitThatEndsAtAnyCallLeavesTheSceneAsItWas"),
+}
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 WORK = ROOT / "build" / "mutate"

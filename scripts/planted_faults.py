@@ -1,24 +1,6 @@
-"""The small faults that scripts/mutate.py plants, and the tests that take long. Their old text must stand exactly once in the
-file: tests/structure/mutate_test.py looks."""
+"""The small faults that scripts/mutate.py plants. Their old text must stand exactly once in the file: tests/structure/mutate_test.py
+looks."""
 import dataclasses
-
-# Tests of a folder that take more than a second each, together minutes: only what the others let pass is put to them.
-LONG = {
-    "trace": ("Hits.BuiltinScenesLikeBruteForce", "Hits.SoupsLikeBruteForce", "Hits.LeafSizeAndCodeBitsChangeNoBit",
-              "Hits.SoupAgainstEveryTriangle", "Hits.FaultResultsDifferByThreadCount", "Simd.SoupsLikeScalar",
-              "Simd.BuiltinScenesLikeScalar", "Simd.EveryBuilderAndLeafSize", "Simd.LimitsBesideTheHit",
-              "Simd.NoRayLeavesAClosedSurface", "KdRays.SoupsLikeBruteForce", "KdRays.BuiltinScenesLikeBruteForce",
-              "KdRays.SharedBunnyLikeTheBvh", "KdNearest.LikeEveryPoint", "Watertight.*", "DoubleWatertight.*",
-              "CwbvhTrace.SoupsLikeScalar", "CwbvhTrace.BuiltinScenesLikeScalar", "OracleHits.BuiltinScenes*",
-              "DoubleTrace.EveryBuilderLikeEveryTriangle", "DoubleTrace.PartsOfTrianglesChangeNoBit",
-              "DoubleTrace.ThreadsLeavesAndCodesChangeNoBit", "DoubleTrace.TIsThatOfExactArithmetic",
-              "RayFaults.GpsCoordinatesCollapseCodes", "Simulate.FiguresDoNotDependOnThreads"),
-    "engine": ("*WorldsAnswerAsTheirTrianglesDo", "DoubleMesh.AtAnyPlaceHasTheHitsOfAllTriangles",
-               "DoubleMesh.OfAnyShapeHasTheHitsOfAllTriangles", "*ShearedInstancesLoseNoHits",
-               "*MixedScenesAnswerAsEachShapeDoes", "*MovedVerticesRefitATreeWhileItIsGood",
-               "*AnswersAreThoseOfEveryMeshOnEveryPath", "InstanceEdges.NearlyFlatMaps",
-               "SceneProgress.ACommitThatEndsAtAnyCallLeavesTheSceneAsItWas"),
-}
 
 
 @dataclasses.dataclass(frozen=True)

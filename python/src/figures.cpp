@@ -31,8 +31,7 @@ nb::dict wide_figures(const WideBvhStats& stats) {
     fields["references"] = stats.references;
     fields["max_depth"] = stats.max_depth;
     fields["children_per_node"] = stats.children_per_node;
-    fields["sah"] =
-        stats.sah > 0 ? nb::cast(stats.sah) : nb::none();  // the root has an area, or none
+    fields["sah"] = stats.sah > 0 ? nb::cast(stats.sah) : nb::none();  // 0: a root without area
     fields["widening"] = stats.widening;
     fields["node_bytes"] = stats.node_bytes;
     fields["triangle_bytes"] = stats.triangle_bytes;
