@@ -153,23 +153,39 @@ HWY_INLINE __m256i sorted_eight(__m256i key) {
     return compare_exchange<0b01010101 ^ other>(key, _mm256_shuffle_epi32(key, 0b10110001));
 }
 
-/// `slots`, two or more, the smallest of `entries` first, which is not quite the smallest where
-/// they differ in the last digits alone; of equal ones the higher slot. No entry is negative. Lanes
-/// behind them mean nothing.
+/// Where rays enter children, as keys that end with 7 - slot. No entry is negative.
+HWY_INLINE __m256i entry_keys(hn::Vec<F8> entries) {
+    const __m256i own = _mm256_setr_epi32(7, 6, 5, 4, 3, 2, 1, 0);
+    return _mm256_or_si256(
+        _mm256_andnot_si256(_mm256_set1_epi32(7), _mm256_castps_si256(entries.raw)), own);
+}
+
+/// The first of slots_by_entry, in fewer clocks. `met`: all bits are set in the lanes of slots that
+/// count, at least one.
+HWY_INLINE std::uint32_t nearest_slot(hn::Vec<F8> entries, hn::Vec<F8> met) {
+    const __m256i none = _mm256_xor_si256(_mm256_castps_si256(met.raw), _mm256_set1_epi32(-1));
+    const __m256i keys = _mm256_or_si256(entry_keys(entries), none);
+    __m128i least = _mm_min_epu32(_mm256_castsi256_si128(keys), _mm256_extracti128_si256(keys, 1));
+    least = _mm_min_epu32(least, _mm_shuffle_epi32(least, 0b01001110));
+    least = _mm_min_epu32(least, _mm_shuffle_epi32(least, 0b10110001));
+    return ~static_cast<std::uint32_t>(_mm_cvtsi128_si32(least)) & 7;
+}
+
+/// `slots`, at least one, the smallest of `entries` first, which is not quite the smallest where
+/// they differ in the last digits alone; of equal ones the higher slot. Lanes behind them mean
+/// nothing.
 HWY_INLINE __m256i slots_by_entry(hn::Vec<F8> entries, std::uint32_t slots) {
-    // Keys end with 7 - slot.
-    const __m256i own = _mm256_setr_epi32(7, 6, 5, 4, 3, 2, 1, 0), digits = _mm256_set1_epi32(7);
-    const __m256i all =
-        _mm256_or_si256(_mm256_andnot_si256(digits, _mm256_castps_si256(entries.raw)), own);
+    const __m256i digits = _mm256_set1_epi32(7);
+    const __m256i all = entry_keys(entries);
     const auto count = static_cast<std::uint32_t>(std::popcount(slots));
     const __m256i none = _mm256_set1_epi32(INT32_MAX);
 #if HWY_TARGET == HWY_AVX3
     const __m256i keys = _mm256_mask_compress_epi32(none, static_cast<__mmask8>(slots), all);
 #else
     const auto packed = compress(f8, hn::BitCast(f8, hn::Vec<I8>{all}), slots);
-    const __m256i keys =
-        _mm256_blendv_epi8(_mm256_castps_si256(packed.raw), none,
-                           _mm256_cmpgt_epi32(_mm256_set1_epi32(8 - static_cast<int>(count)), own));
+    const __m256i behind =
+        _mm256_cmpgt_epi32(hn::Iota(I8(), 0).raw, _mm256_set1_epi32(static_cast<int>(count) - 1));
+    const __m256i keys = _mm256_blendv_epi8(_mm256_castps_si256(packed.raw), none, behind);
 #endif
     // Four in three steps of the same network.
     __m128i four = _mm256_castsi256_si128(keys);

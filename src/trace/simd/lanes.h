@@ -48,14 +48,26 @@ HWY_INLINE std::uint32_t bits_of(D d, Mask mask) {
     return bits & static_cast<std::uint32_t>((std::uint64_t{1} << hn::MaxLanes(d)) - 1);
 }
 
-/// Bit l: a <= b in lane l. With AVX-512 by way of a vector: masks take longer to come to a general
-/// register.
-HWY_INLINE std::uint32_t bits_of_le(hn::Vec<F8> a, hn::Vec<F8> b) {
+/// All bits of lane l where a <= b, else none. With AVX-512 a vector, too: masks take longer to
+/// come to a general register.
+HWY_INLINE hn::Vec<F8> lanes_of_le(hn::Vec<F8> a, hn::Vec<F8> b) {
 #if HWY_TARGET == HWY_AVX3
-    return static_cast<std::uint32_t>(_mm256_movemask_ps(_mm256_cmp_ps(a.raw, b.raw, _CMP_LE_OQ)));
+    return hn::Vec<F8>{_mm256_cmp_ps(a.raw, b.raw, _CMP_LE_OQ)};
 #else
-    return bits_of(f8, hn::Le(a, b));
+    return hn::VecFromMask(f8, hn::Le(a, b));
 #endif
+}
+/// Bit l: the first bit of lane l.
+HWY_INLINE std::uint32_t bits_of_lanes(hn::Vec<F8> lanes) {
+#if HWY_TARGET == HWY_AVX3
+    return static_cast<std::uint32_t>(_mm256_movemask_ps(lanes.raw));
+#else
+    return bits_of(f8, hn::MaskFromVec(lanes));
+#endif
+}
+/// Bit l: a <= b in lane l.
+HWY_INLINE std::uint32_t bits_of_le(hn::Vec<F8> a, hn::Vec<F8> b) {
+    return bits_of_lanes(lanes_of_le(a, b));
 }
 
 /// Bit l: lane l of `least` is below 0 and that of `largest` above it.
