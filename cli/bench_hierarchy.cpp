@@ -13,6 +13,7 @@
 #include <optional>
 
 #include "hierarchy_bench.h"
+#include "option_checks.h"
 
 namespace raydix::cli {
 namespace {
@@ -350,21 +351,21 @@ void add_hierarchy_suite(CLI::App& bench) {
     command->add_option("--sizes", options->sizes, "Triangles of a soup, for times over sizes")
         ->delimiter(',')
         ->allow_extra_args(false)
-        ->check(CLI::Range(1, 100'000'000))
+        ->transform(whole_number(1, 100'000'000))
         ->capture_default_str();
     command
         ->add_option("--cost-sizes", options->cost_sizes,
                      "Triangles of the sheets that kernels are measured on for the prediction")
         ->delimiter(',')
         ->allow_extra_args(false)
-        ->check(CLI::Range(2, 100'000'000))
+        ->transform(whole_number(2, 100'000'000))
         ->capture_default_str();
     command
         ->add_option("--thread-counts", options->thread_counts,
                      "Threads to measure with (default: 1, 2, 4, ... up to --threads)")
         ->delimiter(',')
         ->allow_extra_args(false)
-        ->check(CLI::Range(1, 1024));
+        ->transform(whole_number(1, 1024));
     std::vector<std::string> subjects;
     for (const StudyCase& what : study_cases())
         if (subjects.empty() || subjects.back() != what.subject) subjects.push_back(what.subject);
@@ -386,10 +387,10 @@ void add_hierarchy_suite(CLI::App& bench) {
         ->check(CLI::IsMember({30, 63}))
         ->capture_default_str();
     command->add_option("--max-leaf", options->max_leaf, "Most primitives in a leaf")
-        ->check(CLI::Range(1, 255))
+        ->transform(whole_number(1, 255))
         ->capture_default_str();
     command->add_option("--repeat", options->repeat, "Timed rounds after a warm-up")
-        ->check(CLI::Range(1, 1000))
+        ->transform(whole_number(1, 1000))
         ->capture_default_str();
     add_common_options(*command, options->common);
     command->callback([options] {

@@ -375,23 +375,21 @@ void add_traversal_suite(CLI::App& bench) {
     command
         ->add_option("--sweep-sample", options->sweep_sample,
                      "Part of the rays for the sweep of the width from 1 to 128; 0: no sweep")
-        ->check(finite_number(true))
-        ->check(CLI::Range(0.0, 1.0))
+        ->check(number_up_to(1, true))
         ->capture_default_str();
     command->add_flag("--memory", options->memory,
                       "Also a first-order memory model, as a column of its own");
     command
         ->add_option("--repeat", options->repeat,
                      "Timed launches with --device cuda, opencl or hip")
-        ->check(CLI::Range(1, 1000))
+        ->transform(whole_number(1, 1000))
         ->capture_default_str();
     CLI::Option* const error =
         command
             ->add_option("--error", options->error,
                          "Ends a kind of rays when no sampling error is larger, 0.02 for 2 %; "
                          "packet and while_while trace all launches first, for a correction")
-            ->check(finite_number(false))
-            ->check(CLI::Range(0.0, 1.0));
+            ->check(number_up_to(1, false));
     command
         ->add_option("--state", options->state_file,
                      "Keeps what has been counted in this file after each launch, and goes on "

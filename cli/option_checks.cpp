@@ -70,14 +70,26 @@ bool is_one_of(const std::string& name, std::initializer_list<std::string_view> 
     return std::ranges::find(names, name) != names.end();
 }
 
+/// What `file` leads to through links, also where nothing stands there yet.
+std::filesystem::path followed(const std::string& file) {
+    constexpr int max_links = 40;
+    std::filesystem::path path = file;
+    std::error_code error;
+    for (int k = 0; k < max_links && std::filesystem::is_symlink(path, error); ++k) {
+        const auto next = std::filesystem::read_symlink(path, error);
+        if (error) break;
+        path = path.parent_path() / next;  // an absolute `next` stands alone
+    }
+    return std::filesystem::absolute(path, error);
+}
+
 /// Pipes and devices take any number of results.
 bool same_file(const std::string& a, const std::string& b) {
     namespace fs = std::filesystem;
     std::error_code error;
     if (fs::exists(a, error) && !fs::is_regular_file(a, error)) return false;
     if (fs::equivalent(a, b, error)) return true;
-    return fs::weakly_canonical(fs::absolute(a, error), error) ==
-           fs::weakly_canonical(fs::absolute(b, error), error);
+    return fs::weakly_canonical(followed(a), error) == fs::weakly_canonical(followed(b), error);
 }
 
 void collect_written(const CLI::App& command, const std::string& name, const std::string& file,

@@ -184,8 +184,7 @@ void add_tree_figure_options(CLI::App& command, TreeOptions& options) {
                     "Also compute end-point overlap, over this part of the triangles")
         ->expected(0, 1)
         ->default_str("1")
-        ->check(finite_number(false))
-        ->check(CLI::Range(1e-9, 1.0))
+        ->check(number_up_to(1, false))
         ->type_name("SAMPLE")
         ->group(tree_group);
     for (const char* name : {"--sah-node", "--sah-primitive", "--epo"})
@@ -388,6 +387,20 @@ CLI::Validator any_finite_number() {
                 return good ? std::string() : "'" + text + "' is not a finite float32 number";
             },
             ""};
+}
+
+CLI::Validator number_up_to(double most, bool zero_too) {
+    const auto fault = [=](std::string& text) {
+        double value = 0;
+        const char* end = text.data() + text.size();
+        const auto [rest, error] = std::from_chars(text.data(), end, value);
+        const bool is_number = error == std::errc() && rest == end;
+        const bool is_from = zero_too ? value >= 0 : static_cast<float>(value) > 0;
+        if (is_number && is_from && value <= most) return std::string();
+        return fmt::format("'{}' is not a number {} {}", text,
+                           zero_too ? "from 0 to" : "above 0 and up to", most);
+    };
+    return {fault, fmt::format("FLOAT in {}0 - {}]", zero_too ? "[" : "(", most)};
 }
 
 CLI::Validator finite_number(bool zero_too) {

@@ -112,6 +112,9 @@ void refuse_device(const TreeOptions& tree);
 /// For add_option(...)->check: a finite number above 0, or from 0 on, that is one as a float, too.
 [[nodiscard]] CLI::Validator finite_number(bool zero_too);
 
+/// The same up to `most`; zero_too: from 0 on.
+[[nodiscard]] CLI::Validator number_up_to(double most, bool zero_too);
+
 /// The same, of any sign, without words in the help.
 [[nodiscard]] CLI::Validator any_finite_number();
 

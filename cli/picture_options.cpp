@@ -119,8 +119,7 @@ void add_picture_options(CLI::App& command, PictureOptions& options,
     add_vector("--target", options.target, "Point looked at x y z");
     add_vector("--up", options.up, "Direction that is up in the picture x y z");
     command.add_option("--fov", options.fov, "Vertical field of view in degrees")
-        ->check(finite_number(false))
-        ->check(CLI::Range(0.01f, 179.0f));
+        ->check(number_up_to(179, false));
     command
         .add_option("--samples", options.samples,
                     "Rays per pixel of views with chance (0: the view's own default)")

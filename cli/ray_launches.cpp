@@ -64,14 +64,7 @@ void add_launch_options(CLI::App& command, LaunchOptions& options) {
     command
         .add_option("--sample", options.sample,
                     "Part of the rays to trace: whole launches, or runs of neighbouring rays")
-        ->check([](const std::string& text) {
-            double value = 0;
-            const char* end = text.data() + text.size();
-            const auto [rest, error] = std::from_chars(text.data(), end, value);
-            return error == std::errc() && rest == end && value > 0 && value <= 1
-                       ? ""
-                       : "'" + text + "' is not a number above 0 and up to 1";
-        })
+        ->check(number_up_to(1, false))
         ->capture_default_str();
     command.add_option("--launch-rays", options.launch_rays, "Secondary rays of one launch")
         ->transform(whole_number(1024, 1u << 26))

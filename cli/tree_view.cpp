@@ -68,8 +68,7 @@ void add_tree_view_options(CLI::App& command, TreeViewOptions& options) {
         command
             .add_option("--at", options.at,
                         "Where a slice cuts the scene's box: 0 at its lower end, 1 at its upper")
-            ->check(finite_number(true))
-            ->check(CLI::Range(0.0f, 1.0f))
+            ->check(number_up_to(1, true))
             ->capture_default_str()
             ->group(group));
 }

@@ -154,6 +154,14 @@ class Usage(ProgramTest):
         self.assertIn("of 10 ", self.succeed("build", SMALL, "--repeat", "010").out)  # no octal number
         self.fail_with_one_line("info", "builtin:soup?triangles=10&triangles=20", names=["'triangles' is given twice"])
 
+    def test_numbers_up_to_a_limit(self):
+        for command, option, least, most in ((("build", SMALL), "--epo", "above 0 and up to", 1), (("render", SMALL, "-o", "x.png"), "--fov", "above 0 and up to", 179),
+                                             (("render", SMALL, "-o", "x.png"), "--at", "from 0 to", 1), (("bench", "traversal", SMALL), "--sample", "above 0 and up to", 1),
+                                             (("bench", "traversal", SMALL), "--error", "above 0 and up to", 1), (("bench", "traversal", SMALL), "--sweep-sample", "from 0 to", 1)):
+            for bad in (str(most + 1), "-1", "nan", "inf", "1x", *(["0", "1e-300"] if "above" in least else [])):
+                self.fail_with_usage(*command, f"{option}={bad}", names=[f"{option}: '{bad}' is not a number {least} {most};"])
+        self.fail_with_usage("bench", "hierarchy", SMALL, "--repeat", "0", names=["--repeat: '0' is not a whole number from 1 to 1000;"])
+
     def test_options_that_would_be_ignored(self):
         for arguments, names in ((("trace", SMALL, "--kernel", "engine", "--layout", "binary"), ("--layout", "--kernel engine")),
                                  (("trace", SMALL, "--machine", "h100"), ("--machine", "--device sim")),
@@ -321,7 +329,8 @@ class Usage(ProgramTest):
 
     def test_a_file_is_written_once_and_never_over_what_is_read(self):
         file = self.write("one.ply", TRIANGLE)
-        os.symlink("one.ply", os.path.join(self.folder, "link.ply"))
+        for name, to in (("link.ply", "one.ply"), ("to_h.npy", "h.npy"), ("to_link.npy", "to_h.npy")):
+            os.symlink(to, os.path.join(self.folder, name))
         self.succeed("info", file, "--json", "one.json")
         before = {name: open(os.path.join(self.folder, name), "rb").read() for name in ("one.ply", "one.json")}
         rays = ["trace", file, "--size", "4x4", "--samples", "1"]
@@ -329,6 +338,7 @@ class Usage(ProgramTest):
                                  (["info", file, "--json", "link.ply"], ["--json", "link.ply"]),
                                  ([*rays, "--hits", "h.npy", "--save-rays", os.path.join(self.folder, "h.npy")], ["h.npy"]),
                                  ([*rays, "--hits", "h.npy", "--json", "h.npy"], ["--hits", "--json"]),
+                                 ([*rays, "--hits", "to_link.npy", "--json", "h.npy"], ["--hits", "--json"]),
                                  (["build", file, "-o", "a.rdx", "--json", "a.rdx"], ["--json", "--output"])):
             with self.subTest(arguments[0], names=names):
                 self.fail_with_usage(*arguments, names=names)

@@ -36,7 +36,8 @@ class TurnRay : SingleRay<wanted, counting, compact, false, Parts> {
         (wanted == Wanted::closest || wanted == Wanted::any) && !has_parts;
 
 public:
-    /// As SingleRay's; children go to `stack.pairs`. The frame may change until begin().
+    /// As SingleRay's; children go to `stack.pairs`, for any hit to `stack.words`. The frame may
+    /// change until begin().
     TurnRay(const WideView& tree, SingleFrame& frame, const WideStackView& stack,
             SimdCounts& counts, Parts* parts = nullptr)
         : Base(tree, frame, stack, counts, parts), starts_(frame) {
@@ -61,8 +62,8 @@ public:
                   static_cast<std::uint64_t>(this->tree_.local_pads) << local_bit;
         tmin_ = frame.tmin;
         best_ = {tmax};
-        *stack_.pairs = the_end;
-        top_ = stack_.pairs + 1;
+        top_ = bottom();
+        *top_++ = the_end;
         word_ = 0, next_address_ = nodes_;
         return tmin_ <= tmax;
     }
@@ -134,8 +135,16 @@ private:
     using Base::frame_;
     using Base::stack_;
 
+    /// A child; for closest hits where the ray enters it, too, in the upper half.
+    using Waiting = std::conditional_t<closest, std::uint64_t, std::uint32_t>;
+    [[nodiscard]] Waiting* bottom() const {
+        if constexpr (closest)
+            return stack_.pairs;
+        else
+            return stack_.words;
+    }
     /// Below all children: no node or leaf.
-    static constexpr std::uint64_t the_end = wide_no_child;
+    static constexpr Waiting the_end = wide_no_child;
     static_assert(std::endian::native == std::endian::little);  // pairs are written as two floats
     static constexpr int careful_bit = 56, local_bit = 57;
 
@@ -179,12 +188,12 @@ private:
     }
 
     HWY_INLINE bool pop() {
-        std::uint64_t* top = top_;
-        std::uint64_t pair;
-        do pair = *--top;
-        while (closest && pair > farthest());
+        Waiting* top = top_;
+        Waiting next;
+        do next = *--top;
+        while (closest && next > farthest());
         top_ = top;
-        word_ = static_cast<std::uint32_t>(pair);
+        word_ = static_cast<std::uint32_t>(next);
         next_address_ = place_of<compact>(nodes_, blocks_, word_);
         return word_ != wide_no_child;
     }
@@ -215,9 +224,8 @@ private:
         }
     }
 
-    /// Of children l to l + lanes8 - 1 those that the ray meets go behind the stack's top: a word
-    /// each, and in the upper half where the ray enters it. The nearer one of the first two is
-    /// second. For any hit upper halves mean nothing, and children keep their order.
+    /// Of children l to l + lanes8 - 1 those that the ray meets go behind the stack's top. For
+    /// closest hits the nearer one of the first two is second, for any hit they keep their order.
     HWY_INLINE void push_met(const Node& node, std::size_t l) {
         V entry, exit;
         test_boxes(node, l, entry, exit);
@@ -227,19 +235,22 @@ private:
             met &= used_slots(node) >> l;
             mask = mask_of(f8, met);
         }
-        V word = compress(f8, hn::BitCast(f8, hn::Load(U8(), node.child + l)), mask, met);
+        const V word = compress(f8, hn::BitCast(f8, hn::Load(U8(), node.child + l)), mask, met);
         const auto count = static_cast<std::uint32_t>(std::popcount(met));
-        if constexpr (closest) {
-            // Not -0, whose bits are large.
-            const auto bits = hn::Add(hn::BitCast(I8(), hn::Abs(entry)), hn::Set(I8(), 1));
-            entry = compress(f8, hn::BitCast(f8, bits), mask, met);
-            if constexpr (parts8 == 1) {
-                // Only AVX-512 leaves zeros behind them.
-                if constexpr (HWY_TARGET != HWY_AVX3)
-                    entry = hn::IfThenElseZero(hn::FirstN(f8, count), entry);
-            }
-        }
         auto* const to = reinterpret_cast<float*>(top_ + pushed_);
+        pushed_ += count;
+        if constexpr (!closest) {
+            hn::StoreU(word, f8, to);
+            return;
+        }
+        // Not -0, whose bits are large.
+        const auto bits = hn::Add(hn::BitCast(I8(), hn::Abs(entry)), hn::Set(I8(), 1));
+        entry = compress(f8, hn::BitCast(f8, bits), mask, met);
+        if constexpr (parts8 == 1) {
+            // Only AVX-512 leaves zeros behind them.
+            if constexpr (HWY_TARGET != HWY_AVX3)
+                entry = hn::IfThenElseZero(hn::FirstN(f8, count), entry);
+        }
         const V first = hn::InterleaveLower(f8, word, entry),
                 second = hn::InterleaveUpper(f8, word, entry);
         if constexpr (parts8 == 1) {
@@ -253,26 +264,20 @@ private:
             hn::StoreU(first, f8, to);
             hn::StoreU(second, f8, to + 4);
         }
-        pushed_ += count;
     }
-    /// Four pairs; for closest hits the larger ones first. Of fewer the others are 0.
+    /// Four pairs, the larger ones first. Of fewer the others are 0.
     static HWY_INLINE void store_four(hn::Vec<F4> first, hn::Vec<F4> second, float* to) {
 #if HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_AVX3
-        if constexpr (closest) {
-            __m256i pairs = _mm256_castps_si256(_mm256_set_m128(second.raw, first.raw));
-            // Bitonic, in three steps (Batcher 1968). Upper halves are not negative.
-            pairs =
-                compare_exchange_pairs<0b1001>(pairs, _mm256_permute4x64_epi64(pairs, 0b10110001));
-            pairs =
-                compare_exchange_pairs<0b0011>(pairs, _mm256_permute4x64_epi64(pairs, 0b01001110));
-            pairs =
-                compare_exchange_pairs<0b0101>(pairs, _mm256_permute4x64_epi64(pairs, 0b10110001));
-            _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), pairs);
-            return;
-        }
-#endif
+        __m256i pairs = _mm256_castps_si256(_mm256_set_m128(second.raw, first.raw));
+        // Bitonic, in three steps (Batcher 1968). Upper halves are not negative.
+        pairs = compare_exchange_pairs<0b1001>(pairs, _mm256_permute4x64_epi64(pairs, 0b10110001));
+        pairs = compare_exchange_pairs<0b0011>(pairs, _mm256_permute4x64_epi64(pairs, 0b01001110));
+        pairs = compare_exchange_pairs<0b0101>(pairs, _mm256_permute4x64_epi64(pairs, 0b10110001));
+        _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), pairs);
+#else
         hn::StoreU(first, f4, to);
         hn::StoreU(second, f4, to + 4);
+#endif
     }
 #if HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_AVX3
     /// The larger of each pair and its partner in the lanes of `larger`, else the smaller.
@@ -307,7 +312,7 @@ private:
     std::uint64_t planes_ = 0;  // packed_plane_places, and whether visits are special
     std::uintptr_t nodes_, blocks_;
     std::uintptr_t next_address_ = 0;
-    std::uint64_t* top_ = nullptr;
+    Waiting* top_ = nullptr;
     std::uint32_t word_ = 0;
     // Between the halves of a visit: how many children lie behind the stack's top, or what of the
     // leaf may be hit.
