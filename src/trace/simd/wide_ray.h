@@ -102,7 +102,8 @@ inline WideView view_of(const WideBvh::Arrays& arrays, TriangleBlock* room = nul
 }
 
 /// Children still to visit: words of WideNode::child and where the ray enters them. Rays in turn
-/// keep both in `pairs`, the word in the lower half; null where there are none.
+/// that want the closest hit keep both in `pairs`, the word in the lower half; null if there are
+/// none.
 struct WideStackView {
     std::uint32_t* words;
     float* entries;
